@@ -1,4 +1,4 @@
-"""Colours that mean something, once: the 24 of the tracks and the greys of the 3D scene.
+"""The colours that carry a meaning: the 24 of the tracks and the greys of the 3D scene.
 
 The page has the same colours as custom properties in its tokens; a test compares them.
 Pictures always use the dark set, the 3D scene that of the theme. A track's colour follows

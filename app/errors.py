@@ -1,4 +1,4 @@
-"""The one shape in which a failure reaches a person: what, where, and what to do."""
+"""The one form of all errors: what failed, where, and the remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What messages are made of: pixels, metres and steps; ``null`` stands for what is not there.
+"""The base class of all messages: pixels, metres and steps; ``null`` is a missing value.
 
 pydantic reads docstrings when a class is made, which for all messages together takes a tenth of
 the program's start; here they are read when somebody asks for the description.

@@ -1,4 +1,4 @@
-"""Where the page's files and the manual are."""
+"""The paths of the page's files and of the manual."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ FormatName = Annotated[
     ),
 ]
 
-_RUN = arg(metavar="RUN", help="Its number, or its name.")
+_RUN = arg(metavar="RUN", help="The run's number or name.")
 _RUNS = arg(metavar="RUN …", help="Their numbers or names.")
 
 
@@ -61,7 +61,7 @@ class OfLibrary:
 
 @dataclass
 class ListRuns(OfLibrary):
-    """List the kept runs, the newest first."""
+    """List the stored runs, the newest first."""
 
     recording: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
     """Only those of the recording with this name or folder."""
@@ -69,7 +69,7 @@ class ListRuns(OfLibrary):
 
 @dataclass
 class ShowRun(OfLibrary):
-    """Tell everything that is kept of a run but its tracks."""
+    """Show everything that is stored of a run except its tracks."""
 
     run: Annotated[Positional[str], _RUN]
 
@@ -104,7 +104,7 @@ class ExportRun(OfLibrary):
 
 @dataclass
 class RenameRun(OfLibrary):
-    """Give a run a name, which keeps it for ever; an empty one takes it away."""
+    """Name a run, which exempts it from automatic deletion; an empty name removes the name."""
 
     run: Annotated[Positional[str], _RUN]
     name: Annotated[
@@ -116,7 +116,7 @@ class RenameRun(OfLibrary):
 
 @dataclass
 class StarRun(OfLibrary):
-    """Star runs, which keeps them for ever."""
+    """Star runs, which exempts them from automatic deletion."""
 
     runs: Annotated[Positional[tuple[str, ...]], _RUNS]
     off: FlagCreatePairsOff[bool] = False
@@ -125,7 +125,7 @@ class StarRun(OfLibrary):
 
 @dataclass
 class DeleteRuns(OfLibrary):
-    """Delete runs; for a day, or until `runs gc`, they can be taken back."""
+    """Delete runs; for a day, or until `runs gc`, they can be restored."""
 
     runs: Annotated[Positional[tuple[str, ...]], _RUNS]
     undo: FlagCreatePairsOff[bool] = False
@@ -134,7 +134,7 @@ class DeleteRuns(OfLibrary):
 
 @dataclass
 class DiffRuns(OfLibrary):
-    """Set two runs against each other: values and figures that differ."""
+    """Compare two runs: values and figures that differ."""
 
     first: Annotated[Positional[str], arg(metavar="A", help="Number or name of a run.")]
     second: Annotated[Positional[str], arg(metavar="B", help="Number or name of another.")]
@@ -163,31 +163,31 @@ RunsAction = (
 
 @dataclass
 class Runs:
-    """What is kept of runs: list, show, open, export, rename, star, delete, diff."""
+    """The stored runs: list, show, open, export, rename, star, delete, diff."""
 
     action: OmitSubcommandPrefixes[RunsAction] = field(default_factory=ListRuns)
 
 
 @dataclass
 class Bundle(OfLibrary):
-    """Put a kept run into one ZIP file that `serve FILE.zip` shows on any machine, read only."""
+    """Pack a stored run into one ZIP file that `serve FILE.zip` shows on any machine, read only."""
 
     run: Annotated[Positional[str], _RUN]
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE.zip")]
     """The file to write. It appears when it is complete."""
     videos: FlagCreatePairsOff[bool] = False
-    """Take small videos along."""
+    """Include videos of reduced size."""
 
 
 @dataclass
 class LibraryCommand(OfLibrary):
-    """Look through the file that keeps runs, and repair it."""
+    """Verify the library's file, and repair it."""
 
     action: Annotated[
         Positional[Literal["check"]], arg(help="Read every page of it and every run's tracks.")
     ]
     repair: FlagCreatePairsOff[bool] = False
-    """Where it is damaged: keep a copy aside, and make a new file of what can be read."""
+    """If it is damaged: store a copy beside it, and write a new file of all readable content."""
 
 
 _STUDY = arg(
@@ -223,7 +223,7 @@ class Where:
             help_behavior_hint="(default: $DASK_SCHEDULER_ADDRESS, or this machine)",
         ),
     ] = None
-    """A Dask cluster's scheduler that is there."""
+    """The scheduler of an existing Dask cluster."""
 
 
 @dataclass
@@ -248,7 +248,7 @@ class RunStudy(Where, OfStudies):
 
 @dataclass
 class ResumeStudy(Where, OfStudies):
-    """Go on with a study that was stopped or killed: no trial is lost, none is run twice."""
+    """Resume a study that was stopped or killed: no trial is lost, none is run twice."""
 
     study: Annotated[Positional[str | None], _STUDY] = None
 
@@ -260,7 +260,7 @@ class ListStudies(OfStudies):
 
 @dataclass
 class ShowStudy(OfStudies):
-    """Tell how far a study is, or everything of one of its trials."""
+    """Show the progress of a study, or everything of one of its trials."""
 
     what: Annotated[
         Positional[tuple[str, ...]],
@@ -276,7 +276,7 @@ class ShowStudy(OfStudies):
 
 @dataclass
 class BestOfStudy(OfStudies):
-    """Tell what is best, and what it changes."""
+    """Show the best values, and what they change."""
 
     study: Annotated[Positional[str | None], _STUDY] = None
     save_as: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
@@ -285,7 +285,7 @@ class BestOfStudy(OfStudies):
 
 @dataclass
 class StopStudy(OfStudies):
-    """Have a study that another process runs end at once, with everything kept."""
+    """Stop a study that another process runs; its results so far stay stored."""
 
     study: Annotated[Positional[str | None], _STUDY] = None
 
@@ -313,14 +313,14 @@ StudyAction = (
 
 @dataclass
 class Study:
-    """Many runs with other values, kept as they end: define, run, show, go on, best, export."""
+    """Many runs with varied values: define, run, show, resume, best, export."""
 
     action: OmitSubcommandPrefixes[StudyAction]
 
 
 @dataclass
 class Batch(Where):
-    """Track many recordings and keep every run; at the end a table of their figures."""
+    """Track many recordings, store every run, and print a table of their figures."""
 
     recordings: Annotated[
         Positional[tuple[str, ...]],
@@ -339,31 +339,31 @@ class Batch(Where):
     seeds: FromOne = 1
     """Runs of each recording, with the seeds 0, 1, …"""
     library: LibraryFile = None
-    """The file that the runs are kept in."""
+    """The library's file, in which the runs are stored."""
     keep: FromOne = KEEP
-    """Kept runs without star, name, note and tags that stay, the newest ones."""
+    """Number of runs without star, name, note and tags that stay stored, the newest ones."""
     no_corrections: FlagCreatePairsOff[bool] = False
-    """Do not obey what was put right by hand in the recordings."""
+    """Do not apply the corrections of the recordings."""
     json: FlagCreatePairsOff[bool] = False
     """Print the figures of every run as JSON."""
 
 
 @dataclass
 class Tune(Where, OfStudies):
-    """Find better values for a recording, measured again on other seeds before they are told."""
+    """Search better values for a recording, and evaluate them again on other seeds."""
 
     recordings: Annotated[
         Positional[tuple[str, ...]],
         arg(metavar="RECORDING …", help="Built-in rooms, or folders.", help_behavior_hint=""),
     ]
     minutes: Annotated[float, limited(float, "a number above 0", 1e-9, 1e4)] = 5.0
-    """How long it seeks."""
+    """Duration of the search, minutes."""
     set: SetValues = ()
-    """One value where you are: what it finds is set against these values, and it tries them too."""
+    """One value of the reference, which is tried too, and with which the result is compared."""
     without_truth: FlagCreatePairsOff[bool] = False
     """Do not look at the truth where there is one."""
     save_as: Annotated[str, arg(metavar="NAME")] = "tuned"
-    """The preset that keeps what it found."""
+    """Name of the preset for the values that are found."""
 
 
 _LOG = arg(metavar="LOG", help="A corrections.toml, or a sequence for its own.")
@@ -384,7 +384,7 @@ class ListCorrections:
 
 @dataclass
 class CheckCorrections:
-    """Track a sequence with its corrections, and tell which are met and, where not, why.
+    """Track a sequence with its corrections, and report which are met and why others are not.
 
     Status 1 where one is not met.
     """
@@ -398,7 +398,7 @@ class CheckCorrections:
 
 @dataclass
 class DiffCorrections:
-    """Tell what two logs say differently. Status 1 where they differ."""
+    """Show the differences between two logs. Status 1 where they differ."""
 
     first: Annotated[Positional[str], _LOG]
     second: Annotated[Positional[str], _LOG]
@@ -408,7 +408,7 @@ class DiffCorrections:
 
 @dataclass
 class MergeCorrections:
-    """Write what two logs say as one, in the order of time; refused where they contradict."""
+    """Merge two logs in the order of time; logs that contradict each other are refused."""
 
     first: Annotated[Positional[str], _LOG]
     second: Annotated[Positional[str], _LOG]
@@ -438,7 +438,7 @@ CorrectionsAction = (
 
 @dataclass
 class Corrections:
-    """Read, check, compare and merge what was put right by hand, and make truth of it."""
+    """List, check, compare and merge corrections, and make a ground truth of them."""
 
     action: OmitSubcommandPrefixes[CorrectionsAction]
 
@@ -454,7 +454,7 @@ class ListTemplates:
 
 @dataclass
 class OfferTemplates:
-    """Track a sequence and list the templates that its tracks offer; with --add, take some.
+    """Track a sequence and list the templates that its tracks suggest; with --add, add some.
 
     Boxes of people whom several cameras agree about, in cameras or looks without a template.
     What is added is written into sequence.toml, and what was there is kept beside it.
@@ -477,7 +477,7 @@ class OfferTemplates:
 
 @dataclass
 class RemoveTemplates:
-    """Take templates away from a sequence's file, which is kept beside it as it was."""
+    """Remove templates from a sequence's file; a copy of the file before is stored beside it."""
 
     sequence: SequenceName
     numbers: Annotated[Positional[tuple[int, ...]], arg(metavar="NUMBER …")]
@@ -493,7 +493,7 @@ TemplatesAction = (
 
 @dataclass
 class Templates:
-    """Boxes whose colours model people: list them, have a run offer more, remove some."""
+    """Colour templates of people: list them, suggest more by a run, remove some."""
 
     action: OmitSubcommandPrefixes[TemplatesAction]
 
@@ -521,7 +521,7 @@ DetectorAction = (
 
 @dataclass
 class Detector:
-    """A detection network for recordings without boxes: fetch one, list what is at hand."""
+    """Detection networks for recordings without boxes: fetch one, list the fetched ones."""
 
     action: OmitSubcommandPrefixes[DetectorAction]
 
@@ -564,16 +564,16 @@ class Import:
     ] = None
     """The folder to write."""
     dry_run: FlagCreatePairsOff[bool] = False
-    """Only print what each file is taken for and what was found out."""
+    """Only print how each file is read and what is inferred."""
     copy: FlagCreatePairsOff[bool] = False
     """Copy videos and pictures, which are otherwise linked."""
     name: str = ""
-    """Of the sequence; the folder's name if it is not given."""
+    """Name of the sequence; by default that of the folder."""
 
 
 @dataclass
 class Check:
-    """Check a sequence: calibration, boxes, room, sizes and time, each with what mends it."""
+    """Check calibration, boxes, room, sizes and time of a sequence; each warning has its remedy."""
 
     sequence: SequenceName
 
@@ -604,7 +604,7 @@ class Sequences:
 
 @dataclass
 class Benchmark:
-    """Measure this machine: kernels, filters, pipeline, growth and server. From a checkout only."""
+    """Benchmark this machine: kernels, filters, pipeline, growth, server. From a checkout only."""
 
     names: Annotated[
         Positional[tuple[str, ...]],

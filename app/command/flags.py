@@ -131,7 +131,7 @@ class Serve:
     port: Port = 8000
     """Port to listen on."""
     token: bool = True
-    """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
+    """Admit only requests with the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
     open: bool = field(default_factory=has_screen)
     """Open the page in a browser; by default where there is a screen."""
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
@@ -140,23 +140,24 @@ class Serve:
     """A detection network of your own, as ONNX, which onnx_detector runs on pictures instead of the
     fetched one."""
     library: LibraryFile = None
-    """The file that finished runs are kept in."""
+    """The library's file, in which finished runs are stored."""
     keep: FromZero = KEEP
-    """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
+    """Number of runs without star, name, note and tags that stay stored, the newest ones; 0 stores
+    none."""
     memory: Annotated[
         float | None,
         limited(float, "0.0625 to 65536 GB", 0.0625, 65536.0),
         arg(metavar="GB", help_behavior_hint="(optional)"),
     ] = None
-    """Memory for what is kept for speed, pictures and columns of runs; half of the machine, and
-    no more than 1 GB, where it is not said."""
+    """Memory of the caches of pictures and of runs' columns; by default half of the machine's, at
+    most 1 GB."""
     disk: Annotated[
         float | None,
         limited(float, f"0 to {MOST_GB} GB", 0.0, MOST_GB),
         arg(metavar="GB", help_behavior_hint="(optional)"),
     ] = None
-    """Disk space for what cameras found in earlier runs, of which the least recently used goes
-    first; $MULTIVIEW_PHD_CACHE_GB, or 2 GB, where it is not said. 0 keeps none."""
+    """Disk space of the cache of stage 1, of which the least recently used results are deleted
+    first; by default $MULTIVIEW_PHD_CACHE_GB, or 2 GB. 0 disables it."""
 
 
 @dataclass
@@ -204,17 +205,18 @@ class Track:
     """A detection network of your own, as ONNX, which onnx_detector runs on pictures instead of the
     fetched one."""
     corrections: LogFile = None
-    """What was put right by hand: the run obeys it."""
+    """The corrections that the run applies."""
     no_corrections: FlagCreatePairsOff[bool] = False
-    """Obey none, not even those of the sequence."""
+    """Apply no corrections, not even those of the sequence."""
     cache: bool = True
-    """Take up what the cameras found in an earlier run with the same values, and keep it."""
+    """Read results of stage 1 with the same values from the cache, and write new ones to it."""
     strict: bool = False
     """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
-    """The file that finished runs are kept in."""
+    """The library's file, in which finished runs are stored."""
     keep: FromZero = KEEP
-    """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
+    """Number of runs without star, name, note and tags that stay stored, the newest ones; 0 stores
+    none."""
 
     def changes(self) -> dict[str, Any]:
         """The values asked for, by key: preset, then ``--set``, then flags.
@@ -229,7 +231,7 @@ class Track:
 
 @dataclass
 class Detect:
-    """Find people with a detection network (ONNX) and write the boxes of every camera as CSV."""
+    """Detect people with a network (ONNX) and write the boxes of every camera as CSV."""
 
     sequence: SequenceName
     output: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER")]
@@ -237,14 +239,14 @@ class Detect:
     model: Annotated[
         Path | None, arg(metavar="MODEL", help_behavior_hint="(default: the fetched one)")
     ] = None
-    """An ONNX file; its layout is found out from the shapes of what it gives."""
+    """An ONNX file; the layout of its outputs is inferred from their shapes."""
     set: SetValues = ()
     """One parameter, as in --set onnx_detector.score_threshold=0.5; `parameters` lists the keys."""
 
 
 @dataclass
 class Evaluate:
-    """Score a track file against the truth, or, without one, estimate how well ids hold."""
+    """Score a track file against the truth, or, without one, estimate the consistency of ids."""
 
     sequence: SequenceName
     tracks: Annotated[
@@ -252,8 +254,8 @@ class Evaluate:
         arg(
             metavar="TRACKS",
             help="As `track` and the page write them: CSV, JSON, Parquet, TRC, or MOTChallenge's "
-            "ground plane (.txt). Without one nothing needs to be known of the "
-            "truth: the sequence is tracked forward, backwards and without each camera.",
+            "ground plane (.txt). Without one no truth is needed: the sequence is tracked forward, "
+            "backwards and without each camera.",
             help_behavior_hint="(optional)",
         ),
     ] = None
@@ -337,9 +339,9 @@ def _import_with_flags() -> Any:
         elif option == "boxes":  # the one flag of two options
             layouts = get_args(get_args(own.annotation)[0])
             choices: Any = Literal[*layouts, *(f"{one}-normalised" for one in layouts)] | None
-            kind = Annotated[choices, arg(help=words, help_behavior_hint="(default: found out)")]
+            kind = Annotated[choices, arg(help=words, help_behavior_hint="(default: inferred)")]
         else:
-            kind, _ = flag_of(ImportOptions, option, "default: found out")
+            kind, _ = flag_of(ImportOptions, option, "default: inferred")
         flags.append((name, kind, field(default=own.default)))
     with_flags = make_dataclass("ImportWithFlags", flags, bases=(Import,))
     with_flags.__doc__ = Import.__doc__

@@ -63,7 +63,7 @@ def import_files(command: Import) -> int:
         say(f"{refusal}; nothing was written")
         return REFUSED
     print()
-    print_table(("found out", "as"), settled.found)
+    print_table(("inferred", "value"), settled.found)
     uses = file_uses(taken, settled.sources)
     facts = (
         f"{len(settled.views)} cameras, {settled.frames} steps at {settled.fps:g} a second, "

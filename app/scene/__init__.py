@@ -1,1 +1,1 @@
-"""The 3D view: what viser draws, and what a person changes in it."""
+"""The 3D view: its drawing by viser, and its editing."""

@@ -1,1 +1,1 @@
-"""What the workbench knows: the open recording, its runs, and whoever works on them."""
+"""The state of the workbench: the open recording, its runs, and the jobs that compute them."""

@@ -1,1 +1,1 @@
-"""What the page talks to: the server, its routes and its sockets."""
+"""The server of the page: its routes, sockets and access control."""

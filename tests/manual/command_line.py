@@ -11,10 +11,10 @@ from tests.manual.places import ROOT
 
 INTRODUCTION = """# Command line
 
-This is what the program answers to `--help`. Status 0 means success, 1 a failure that is told
-in one line, 2 wrong usage, 130 that it was ended by Ctrl-C. Of `import`, 3 means that the files
-leave open how they are meant, and 4 that no interpretation explains the boxes: nothing is written,
-and what is printed names the flags that decide.
+The output of `--help` for every command. Exit status 0 means success, 1 a failure, which is
+reported in one line, 2 wrong usage, and 130 an end by Ctrl-C. With `import`, 3 means that the files
+allow several interpretations, and 4 that no interpretation explains the boxes: in both cases
+nothing is written, and the output names the flags that decide.
 
 ```sh
 multiview-phd serve [SEQUENCE] [--data DIR]           # the workbench; without SEQUENCE: room44-3p
@@ -23,28 +23,27 @@ multiview-phd track SEQUENCE -o tracks.csv --preset published --set fusion.clutt
 multiview-phd evaluate SEQUENCE tracks.csv --html report.html
 ```
 
-`SEQUENCE` is a folder or a built-in name. Every parameter is a flag of `track` as well; what each
-does stands on the page [Tuning](tuning.md).
+`SEQUENCE` is a folder or the name of a built-in room. Every parameter is also a flag of `track`;
+the page [Tuning](tuning.md) describes them all.
 
-Three places are kept outside the sequences: compiled kernels and what cameras found in
-`~/.cache/multiview-phd` or `$MULTIVIEW_PHD_CACHE`; your presets, and what you teach and correct
-of a built-in room, in `~/.config/multiview-phd` or `$MULTIVIEW_PHD_SETTINGS`; the library of runs
-and the studies in `~/.local/share/multiview-phd`. With `MULTIVIEW_PHD_TRACEBACK=1` an unexpected
-failure shows where it happened.
+The program writes to three folders besides the sequences: compiled kernels and cached results of
+stage 1 to `~/.cache/multiview-phd` or `$MULTIVIEW_PHD_CACHE`; presets, and the templates, entrances
+and corrections of built-in rooms, to `~/.config/multiview-phd` or `$MULTIVIEW_PHD_SETTINGS`; the
+library of runs and the studies to `~/.local/share/multiview-phd`. With `MULTIVIEW_PHD_TRACEBACK=1`
+an unexpected failure is reported with its traceback.
 
 ## The cache
 
-What the methods of stage 1 found in the pictures of a recording is written to the folder
-`stages` of the cache once a run has all of its steps, so that a run with other values of the
-later stages, also after the next start, reads no picture again. All that lies there can be
-computed anew and may be deleted at any time.
+When a run has computed all steps of stage 1, their results are written to the folder `stages` of
+the cache. A later run with other parameters of stages 2 to 4, also after a restart, then decodes no
+picture again. The folder may be deleted at any time; the results are then computed again.
 
-It takes 2 GB at most, or `$MULTIVIEW_PHD_CACHE_GB` of all commands, studies and their workers,
-or `serve --disk GB` of one workbench; 0 keeps nothing. What was used least recently is deleted
-first: when a result is written, and at the start for a limit that is lower than before. A
-result that is larger than the limit is not written: an hour of one camera at 25 fps takes about
-0.8 GB, so that long recordings of several cameras want a higher limit. Where the disk is full
-or the folder cannot be written to, runs go on without the cache, with a line in the log; `track
+The cache takes at most 2 GB; `$MULTIVIEW_PHD_CACHE_GB` sets another limit for all commands, studies
+and their workers, and `serve --disk GB` for one workbench; 0 disables the cache. The least recently
+used results are deleted first, when a result is written and, if the limit was lowered, at the
+start. A result that is larger than the limit is not written: an hour of one camera at 25 fps takes
+about 0.8 GB, so long recordings of several cameras need a higher limit. If the disk is full or the
+folder cannot be written to, runs continue without the cache, with a line in the log; `track
 --no-cache` neither reads nor writes it.
 """
 

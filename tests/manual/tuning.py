@@ -24,51 +24,55 @@ This page is made from the definitions in `tracker/parameters`, like the sliders
 
 ## Where they are set
 
-Beside the 3D view are the essential ones of the methods in use, as plain sliders, with presets and
-methods below them; a hint says unit, range, default and what is published. The tab *Parameters*
-has all that have an effect with these methods, by topics, the essential ones first: slider, number
-and unit of each. The slider of a range over decades is logarithmic; a tick on it is the published
-value. What is set in one place shows in the other, and whoever holds a slider or types keeps it.
+Beside the 3D view are the essential parameters of the chosen methods, as plain sliders, with
+presets and methods below them; a hint gives unit, range, default and published value. The tab
+*Parameters* lists all parameters that have an effect with these methods, by topic, the essential
+ones first, each with a slider, a number and the unit. A range over decades has a logarithmic
+slider; a tick on a slider marks the published value. Both places show the same values; while a
+slider is dragged or a number is typed, changes from elsewhere do not overwrite it.
 
-- A click on a name tells what it is, its range, default and published value, and leads here.
-- The field in the table's head finds words of name, symbol, key, unit or help; *changed only*
-  leaves out what stands at its default. The palette (Ctrl+K) sets a parameter by its name too, or
-  shows it in the table.
-- The arrow of a changed row resets it, *Reset all* every value and method; *Save as* keeps all
-  under a name.
-- *Effect* in the head runs the recording with a few other values of each of the first twelve
-  parameters that are listed, in the background, until somebody works again. A row then has the
-  curve of MOTA (without truth: of the number of tracks) over the values, and the share of its
-  variance that the parameter explains alone, among those that were run. That is the importance
-  which [studies](studies.md) report, with one parameter moved at a time.
+- A click on a name shows the help, range, default and published value, with a link to this page.
+- The search field above the table searches name, symbol, key, unit and help; *changed only* hides
+  parameters at their defaults. The palette (Ctrl+K) also sets a parameter by its name, or shows it
+  in the table.
+- The arrow of a changed row resets it, *Reset all* resets every value and method; *Save as* stores
+  all values as a preset.
+- *Effect* above the table runs the recording with a few other values of each of the first twelve
+  listed parameters, in the background, while the workbench is not used otherwise. Each row then
+  shows the curve of MOTA (without ground truth: of the number of tracks) over the values, and the
+  share of the variance of MOTA over all these runs that this parameter alone explains: the
+  importance that [studies](studies.md) report, here with one parameter varied at a time.
 
 ## In which order
 
 1. **Choose what is measured.** With templates and pictures: `colour_phd`. With pictures alone:
-   `onnx_detector` where a network is at hand and people are 100 pixels high or more, else
-   `shapes`, or `jpda` and `association_matrix`, which look at the foreground. With a detector's
-   boxes: `none` or `detection_phd`.
-2. **Look at stage 1 first**: the boxes in the pictures. Somebody without a box in any camera
-   cannot be found; boxes on furniture that stay at one place can become ghosts.
-   `acceptance_distance`, `acceptance_foreground` and the foreground's `threshold` decide most.
-3. **Then the fusion**: `clutter_rate` is how many of the boxes you saw were nobody,
-   `detection_probability` how often a visible person had one. These two are counts that you can
-   read off the pictures rather than knobs to be turned.
-4. **Then who is whom**: the fusion's birth, motion and recognition.
-5. **Last the threshold of extraction**, which re-runs nothing: it only says how sure is sure.
+   `onnx_detector` if a network was fetched and people are 100 pixels high or more, else `shapes`,
+   or `jpda` and `association_matrix`, which look at the foreground. With a detector's boxes: `none`
+   or `detection_phd`.
+2. **Stage 1 first**: look at the boxes in the pictures. A person without a box in any camera is not
+   tracked; boxes on furniture that stay at one place can become false tracks.
+   `acceptance_distance`, `acceptance_foreground` and the foreground's `threshold` have the largest
+   effect.
+3. **Then the fusion**: `clutter_rate` is the mean number of boxes per camera and step that belong
+   to no person, `detection_probability` the share of the visible people who have a box. Estimate
+   both by counting boxes in the pictures.
+4. **Then the identities**: the fusion's birth, motion and recognition.
+5. **Last the extraction threshold**, the weight above which a component is reported; a change of it
+   runs no filter again.
 
-Pin a run as A (`Pin as A`) before a change; lanes, strips and the Compare tab then show both.
+Before a change, `Pin as A` stores the shown run as A: the timeline and the Compare tab then show
+both runs.
 
-A preset, study, kept run, address or command of an earlier version may name a parameter that no
-longer exists. It opens all the same, without that value, and a note says what holds instead.
+A preset, study, stored run, address or command of an earlier version may name a parameter that no
+longer exists. It opens without that value, and a note names the value that holds instead.
 
 ## How to read the pictures
 
-Each is a short piece of a sequence, run once for every marked value, all other parameters at
-their defaults. Left: the share of true positions with an estimate within 0.3 m. Middle: false
-estimates a step. Right: mean error in metres. The dashed line is the default. They show the
-direction and the scale of an effect on *that* piece, not the best value for yours; a flat line
-means that this piece does not need the parameter. The values are in
+Each picture shows runs of a short piece of a sequence, one for every marked value, with all other
+parameters at their defaults. Left: the share of true positions with an estimate within 0.3 m.
+Middle: false estimates per step. Right: mean error in metres. The dashed line is the default. The
+pictures show the direction and the scale of an effect on *that* piece, not the best value for
+yours; a flat line means that the parameter has no effect on this piece. The values are in
 `static/manual/records/sweeps.json`, made by `python3 -m tests.manual --sweeps`.
 """
 

@@ -1,4 +1,4 @@
-"""Is a recording as it should be: what is odd in sentences, each with what mends it.
+"""The checks of a recording: each finding is one sentence, with the remedy.
 
 ``check(sequence)`` runs every check that costs no more than a few seconds a camera; nothing is
 changed by it.

@@ -1,1 +1,1 @@
-"""How files are meant: every interpretation judged by one likelihood, decided, open or none."""
+"""The interpretation of files: poses, axes, units and boxes, compared by one likelihood."""

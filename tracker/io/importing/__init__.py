@@ -1,1 +1,1 @@
-"""From files of whatever kind to a sequence folder: gathered, matched, settled, written."""
+"""The import of foreign files as a sequence folder: gathered, matched, interpreted and written."""

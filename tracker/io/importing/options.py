@@ -33,7 +33,7 @@ class CommonImportOptions(BaseModel):
     up: Up | None = None
     """Axis of the calibration's world that points up."""
     pose: Direction | None = None
-    """Where R and t lead."""
+    """Direction of R and t."""
     axes: Axes | None = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
     turns: Annotated[str, Field(max_length=40)] | None = None

@@ -1,4 +1,4 @@
-"""What the columns of a table mean, by their names: frame, box, score, person, place.
+"""The meaning of a table's columns by their names: frame, box, score, person, place.
 
 Shared by CSV and JSON of detectors, of annotation programs and of one's own scripts. The
 four numbers of a box are told apart by the names (``x2`` is no width); where there is but a

@@ -1,4 +1,4 @@
-"""Matrices, vectors and lenses out of what a file has in a field, checked."""
+"""Matrices, vectors and lens models from the fields of a file, validated."""
 
 from __future__ import annotations
 

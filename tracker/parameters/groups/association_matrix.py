@@ -17,12 +17,11 @@ _TARGETS = {"output": ("targets",)}
 
 
 class AssociationMatrixParams(Params):
-    """Single-view tracker by association matrices of foreground objects ([CMQ07]).
+    """Single-view tracker by association matrices of foreground objects ([CMQ07])."""
 
-    The class's constants are thresholds of the paper, which were parameters. Halved and doubled,
-    none changed the mean of recall, false positives a step or IDF1 by 0.005 in as many as two of
-    the random rooms that the table of ``tests.papers.rooms.ablations`` lists.
-    """
+    # The class constants are thresholds of the paper and no parameters: halved and doubled, none
+    # changes the mean of recall, false positives a step or IDF1 by 0.005 in as many as two of the
+    # random rooms that the table of `tests.papers.rooms.ablations` lists.
 
     reach: Annotated[
         float, Field(ge=0.1, le=10.0), ui("T_d", "Motion", unit="object sizes", step=0.1)

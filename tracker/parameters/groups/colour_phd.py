@@ -81,12 +81,11 @@ class ColourBoxParams(Params):
 
 
 class ColourPeakParams(ColourBoxParams):
-    """Peaks of the colour likelihood ([ZW21] §2.2).
+    """Peaks of the colour likelihood ([ZW21] §2.2)."""
 
-    The constant was a parameter, as were those of the filter. Halved and doubled, none changed the
-    mean of recall, false positives a step or IDF1 by 0.005 in as many as two of the random rooms
-    that the table of ``tests.papers.rooms.ablations`` lists.
-    """
+    # The class constants here and of the filter are no parameters: halved and doubled, none changes
+    # the mean of recall, false positives a step or IDF1 by 0.005 in as many as two of the random
+    # rooms that the table of `tests.papers.rooms.ablations` lists.
 
     likelihood_sigma: Annotated[float, Field(ge=0.02, le=0.5), ui("σ", step=0.01)] = 0.1
     """Spread of the distance D to the nearest template in the colour likelihood N(D; 0, σ²)."""

@@ -14,12 +14,11 @@ from tracker.parameters.method import Method, Reads, Uses, Values
 
 
 class DetectionBoxParams(Params):
-    """A detector's boxes: their noise, and their places in the room.
+    """A detector's boxes: their noise, and their places in the room."""
 
-    The constant was a parameter. Halved and doubled, every track stayed the same to the bit in
-    four random rooms (``tests.papers.rooms.ablations``): three deviations allow for all but one
-    box in 370.
-    """
+    # The class constant is no parameter: halved and doubled, every track stays the same to the bit
+    # in four random rooms (`tests.papers.rooms.ablations`): three deviations allow for all but one
+    # box in 370.
 
     depth_sigmas: ClassVar[float] = 3.0
     """Largest error of a box's size, in standard deviations, for the check whether its target can
@@ -57,13 +56,12 @@ class DetectionBoxParams(Params):
 
 
 class DetectionPhdParams(Params):
-    """Single-view GM-PHD filter on an outside detector's boxes.
+    """Single-view GM-PHD filter on an outside detector's boxes."""
 
-    The class's constants were parameters. Halved and doubled, or their distances from 1, none
-    changed recall, false positives a step or IDF1 by as much as 0.003 in six random rooms, two of
-    which were chosen for four people and more (``tests.papers.rooms.ablations``): the boxes go to
-    the fusion, and the filter decides only which of them no target explains.
-    """
+    # The class constants are no parameters: halved and doubled, or their distances from 1, none
+    # changes recall, false positives a step or IDF1 by as much as 0.003 in six random rooms, two of
+    # which were chosen for four people and more (`tests.papers.rooms.ablations`): the boxes go to
+    # the fusion, and the filter decides only which of them no target explains.
 
     survival_probability: ClassVar[float] = 0.99
     """Probability that a person in the picture is still there a step later."""
@@ -188,12 +186,11 @@ DETECTED = Method(
 
 
 class ShapesParams(Params):
-    """People by the shape of head and trunk, without templates ([DTPB09]).
+    """People by the shape of head and trunk, without templates ([DTPB09])."""
 
-    They are followed in the picture by ``jpda`` with its default parameters: halved and doubled,
-    none of those and not the constant changed a bit of any track in six random rooms
-    (``tests.papers.rooms.ablations``), since all people by shape go to the fusion.
-    """
+    # The targets of `jpda` with default parameters follow them in the picture. Halved and doubled,
+    # neither these parameters nor the class constant change any track in six random rooms
+    # (`tests.papers.rooms.ablations`): all people by shape go to the fusion.
 
     least_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, essential=True)] = (
         0.5

@@ -15,12 +15,11 @@ from tracker.parameters.method import Reads
 
 
 class PictureParams(Params):
-    """Size and rotation of the pictures of stage 1; its boxes are converted back to full pixels.
+    """Size and rotation of the pictures of stage 1; its boxes are converted back to full pixels."""
 
-    The class's constants were parameters. Halved and doubled, none changed the mean of recall,
-    false positives a step or IDF1 by 0.005 in as many as two of the random rooms that the table of
-    ``tests.papers.rooms.ablations`` lists, with any method.
-    """
+    # The class constants are no parameters: halved and doubled, none changes the mean of recall,
+    # false positives a step or IDF1 by 0.005 in as many as two of the random rooms that the table
+    # of `tests.papers.rooms.ablations` lists, with any method.
 
     lines: Annotated[int, Field(ge=120, le=4320), ui("n_l", unit="px", log=True)] = 480
     """A picture whose shorter side is longer than this is reduced to it."""

@@ -20,12 +20,11 @@ _FIVE = {"five_cases": (True,)}
 
 
 class JpdaParams(Params):
-    """Single-view tracker by joint probabilistic data association, with five cases ([WW10]).
+    """Single-view tracker by joint probabilistic data association, with five cases ([WW10])."""
 
-    The class's constants were parameters. Halved and doubled, none changed the mean of recall,
-    false positives a step or IDF1 by 0.005 in as many as two of the random rooms that the table of
-    ``tests.papers.rooms.ablations`` lists.
-    """
+    # The class constants are no parameters: halved and doubled, none changes the mean of recall,
+    # false positives a step or IDF1 by 0.005 in as many as two of the random rooms that the table
+    # of `tests.papers.rooms.ablations` lists.
 
     measurements: Annotated[Literal["foreground", "colour", "detections"], ui("Z")] = "foreground"
     """What is associated: boxes of the foreground, peaks of the colour likelihood, or an outside

@@ -20,12 +20,11 @@ _PSEUDO = {"filter": ("pseudo",)}
 
 
 class PseudoParticleParams(Params):
-    """Single-view pseudo particle filter, and the classical one beside it ([SG08]).
+    """Single-view pseudo particle filter, and the classical one beside it ([SG08])."""
 
-    The class's constants were parameters. Halved and doubled, none changed the mean of recall,
-    false positives a step or IDF1 by 0.005 in as many as two of the random rooms that the table of
-    ``tests.papers.rooms.ablations`` lists.
-    """
+    # The class constants are no parameters: halved and doubled, none changes the mean of recall,
+    # false positives a step or IDF1 by 0.005 in as many as two of the random rooms that the table
+    # of `tests.papers.rooms.ablations` lists.
 
     filter: Annotated[Literal["pseudo", "classical"], ui("p(x|z)")] = "pseudo"
     """Clusters of particles as targets, or one posterior whose mean is the only one."""

@@ -1,1 +1,1 @@
-"""Where people really were, as data sets give it."""
+"""Ground truth in the formats of data sets."""
