@@ -45,16 +45,16 @@ EXCHANGED: dict[str, dict[str, str]] = {
     },
 }
 
-INTRODUCTION = f"""## The same on every machine?
+INTRODUCTION = f"""## Reproducibility
 
-The same seed gives the same tracks, to the last bit, whatever the number of cores and whatever
-instructions linear algebra, NumPy, OpenCV and the compiled kernels choose: each was exchanged
-alone, on {STEPS} steps of `{ROOM}` drawn afresh. What is left is the C library, whose exponential
-differs in the last digit where the processor has no fused multiply-add (all have since about 2013).
-Where two people meet, a last digit can decide who is who: means over several seeds say more than
-one.
+The same seed gives bit-identical tracks for any number of cores, and for any instruction set that
+the linear algebra, NumPy, OpenCV and the compiled kernels select: each was exchanged alone, on
+{STEPS} steps of `{ROOM}`, rendered again. The one exception is the C library: its exponential
+function differs in the last digit on processors without fused multiply-add (before about 2013).
+Where two people meet, the last digit can change the identities, so means over several seeds are
+more reliable than one run.
 
-Made anew by `python3 -m tests.manual --machines`.
+`python3 -m tests.manual --machines` makes this table again.
 """
 
 

@@ -12,27 +12,28 @@ FILE = RECORDS / "checks.json"
 FOUND_WITHIN = 1.0
 """Frames within which an offset counts as found."""
 
-INTRODUCTION = """## Other people's recordings
+INTRODUCTION = """## Import and check
 
-How often the usual mistakes are named, and how well late cameras are found, on recordings in which
-each was made on purpose; and how long it takes from the files of others to tracks, by two commands
-and without a flag. Made anew by `python3 -m tests.io.checks --record`.
+These tables show how often `check` names the usual mistakes and how accurately it estimates the
+delay of a camera, on recordings in which each mistake was made on purpose, and how long the import
+and tracking of foreign files takes, without a flag. `python3 -m tests.io.checks --record` makes
+them again.
 """
 
 MISTAKES = """Mistakes: translations in millimetres, camera-to-world poses, OpenGL's axes, y up,
 corners for sizes, frames counted from 1, parts of the picture for pixels, and two calibrations
-exchanged. One counts as named where the right remedy stands alone. *False alarms* are warnings
-about the recording as it is.
+exchanged. A mistake counts as named if the right remedy is the only one. *False alarms* are
+warnings about the unchanged recording.
 """
 
-OFFSETS = f"""Offsets: the second camera's pictures begin so many frames later; found from the
-motion in the pictures within {FOUND_WITHIN:g} frame.
+OFFSETS = f"""Offsets: the pictures of the second camera begin later by the stated number of frames.
+An offset counts as found if the estimate from the motion in the pictures is within
+{FOUND_WITHIN:g} frame.
 """
 
 IMPORTS = """From the files to tracks: `import FOLDER -o SEQUENCE` and `track SEQUENCE -o
-tracks.csv`, on two cores that other work shared, nothing kept from an earlier run. The poses of
-pose2sim-multi are of another cut of its videos, so its figures say that it opens and is tracked,
-and no more.
+tracks.csv`, on two cores shared with other work, with an empty cache. The poses of pose2sim-multi
+belong to another cut of its videos, so its figures show only that it can be imported and tracked.
 """
 
 

@@ -25,21 +25,38 @@ SMALLER = "A smaller form, run as `python -m tests.papers {experiment} {form}`."
 INTRODUCTION = """# Results
 
 Every table on this page is printed from a record under `static/manual/records/`, and a test checks
-that they agree. The records are made anew by one command in a checkout, with the real recordings in
-a folder `DIR`:
+that page and records agree. In a checkout one command makes the records again, with the real
+recordings in the folder `DIR`:
 
 ```sh
 python3 -m tests.manual --record --data DIR
 ```
 
-One experiment alone, figure included, is run by `python -m tests.papers NAME --data DIR`; what
-took too long to be run whole says in which smaller form it was. The rooms are rendered. Three of
-them come with the program, in 600 steps, of which `sequences` speaks; `fig1` to `fig3` and
-`methods` render 1,500 steps of the same scenes, since the papers' claims are of later steps.
-AV16.3 and the Curtin recordings are real
-([sources](methods.md#sources)). *Found* is the share of true positions with an estimate within
-the stated distance, *error* the mean distance of those that are matched; every other figure is
-defined in [`tracker.evaluation`](api/evaluation.md).
+`python -m tests.papers NAME --data DIR` runs one experiment, with its figure. An experiment that
+was run in a smaller form states the form. The rooms are rendered: three of them are installed with
+the program, with 600 steps each (`sequences`); `fig1` to `fig3` and `methods` render 1,500 steps of
+the same scenes, since the papers' claims are about later steps. AV16.3 and the Curtin recordings
+(`cmc1`, `cmc2`) are real ([sources](methods.md#sources)).
+
+*Found* is the share of true positions with an estimate within the stated distance, *error* the mean
+distance of the matched ones; [`tracker.evaluation`](api/evaluation.md) defines all other figures. A
+*gate* is the distance above which an estimate and a true position are not matched. In the first
+table *better* means that the claim holds or is exceeded, and *worse* that it is not reached.
+
+## Limits
+
+- Colours need templates, and people whose clothes differ; without templates people are detected by
+  shape, which fails most often where people sit, never leave their place, or the picture is noisy
+  ([`rooms`](#rooms)), and on real pictures more often than in rendered ones
+  ([`methods`](#methods)).
+- A person who is more than half hidden in all cameras is often not tracked ([`fig2`](#fig2),
+  [`fig3`](#fig3)).
+- Answers to the review queue correct a part of the identity errors only
+  ([`corrections`](#corrections)).
+- Most recordings here have few people and last for a minute or less. `wildtrack-points-300` is the
+  one crowd. In the two recordings whose names contain `points` the boxes are not those of a
+  detector: they are made from hand-marked points and boxes, with simulated noise, misses and
+  clutter, so tracks are more accurate there than with a detector.
 """
 
 
