@@ -137,6 +137,7 @@ REMOVED: Mapping[str, str] = {
     "pseudo_particle.memory": "a target of the same colours continues an id within 10 s",
     "pictures.target_height": "pictures are reduced until the median target is 160 pixels high",
     "pictures.least_height": "no picture is reduced until the median target is below 40 pixels",
+    "foreground.blinding_share": "a picture that differs everywhere is segmented like any other",
     "pictures.level_from": "pictures of cameras that are rolled by more than 0.15 rad are turned",
     "association_matrix.interrupted_steps": "a track ends without an object for over 25 steps",
     "association_matrix.return_similarity": "an object continues a track from a similarity of 0.6",

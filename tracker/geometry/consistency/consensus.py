@@ -21,6 +21,10 @@ from numpy import ndarray
 
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, in_world
 
+# Halved and doubled, the constants below leave all interpretations as they are in the random rooms
+# of seeds 1300 … 1303, correct and with one mistake each (camera-to-world poses, y up, frames
+# counted from 1, exchanged calibrations); the rooms that are estimated change by 0.2 m at most by
+# the first two, and not at all by the others.
 LARGEST_GAP = 0.15
 """Largest distance between two rays of one point, as a share of the person's height there."""
 

@@ -157,8 +157,7 @@ class AdaptiveForeground:
     ) -> tuple[AdaptiveState, Segmentation]:
         """Segment one image and update the background.
 
-        A blank image, or one that differs mostly from the background, has no foreground
-        and does not change the background.
+        A blank image has no foreground and does not change the background.
 
         Args:
             state: The state after the image before.
@@ -175,8 +174,7 @@ class AdaptiveForeground:
             )
         thresholds = self.thresholds(difference)
         different = above(difference, thresholds)
-        share = cv2.countNonZero(different) / different.size
-        if share > p.blinding_share or cv2.meanStdDev(picture)[1].max() < p.blank_deviation:
+        if cv2.meanStdDev(picture)[1].max() < p.blank_deviation:
             return state, Segmentation(np.zeros_like(different), thresholds)
         mask = clean(different, p.minimum_area)
         after = update_background(
