@@ -114,7 +114,7 @@ class ForegroundParams(Params):
     """The shares of light that a shadow leaves in the three channels differ by at most this."""
 
     # Without this rule, and as published, 0.04 to 0.53 of ten grey, white or covered pictures is
-    # foreground in the built-in rooms, and with it nothing; with the matched exposure of the default
+    # foreground in the built-in rooms, and with it nothing; with the matched exposure, the default,
     # nothing is foreground without it either.
     blank_deviation: Annotated[
         float,
