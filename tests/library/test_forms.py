@@ -278,6 +278,14 @@ def test_trackeval_and_evaluate_agree_on_the_ground_plane(motchallenge: OfTrackE
     assert ours["hota"] == pytest.approx(float(np.mean(hota["HOTA"])), **close)
 
 
+def test_trackeval_reads_no_position_as_a_class(tmp_path: Path) -> None:
+    """Its reader takes the eighth number for the class, and refuses classes above 1."""
+    away = replace(TRACKS, positions=TRACKS.positions + 7.0)
+    save(tmp_path / "mot", FORMATS["motchallenge"], replace(WRITTEN, tracks=away))
+    data = OfTrackEval(tmp_path / "mot").data(f"{WRITTEN.sequence.name}-ground-plane")
+    assert data["num_tracker_dets"] == np.count_nonzero(TRACKS.frames < STEPS)
+
+
 def test_each_camera_s_boxes_are_read_by_trackeval(motchallenge: OfTrackEval) -> None:
     for index, camera in enumerate(CAMERAS):
         name = f"{WRITTEN.sequence.name}-{camera.name}"

@@ -1,10 +1,12 @@
 """MOTChallenge text in TrackEval's folders: a file for each camera, and one for the ground plane.
 
-A row is ``frame, id, left, top, width, height, confidence, x, y, z``; frames and ids start at 1.
-In a camera's file the box is the reprojected one in pixels, which also start at 1
-[MOT16, sec. 4.2]; in the file of the ground plane it is the target's outline on the floor in
-metres. In both, x, y, z are world metres. A person of the truth with an uncertain position (``valid
-= 0``) is written as a distractor: a track that matches it counts neither as correct nor as false.
+A row is ``frame, id, left, top, width, height, confidence, -1, -1, -1, x, y, z``; frames and ids
+start at 1. Columns 8 to 10 are -1 as in results of the 2D challenge, since TrackEval reads the
+eighth as the class; it ignores the columns after them. In a camera's file the box is the
+reprojected one in pixels, which also start at 1 [MOT16, sec. 4.2]; in the file of the ground plane
+it is the target's outline on the floor in metres. In both, x, y, z are world metres. A person of
+the truth with an uncertain position (``valid = 0``) is written as a distractor: a track that
+matches it counts neither as correct nor as false.
 
 [MOT16] Milan, Leal-Taixé, Reid, Roth, Schindler, "MOT16: a benchmark for multi-object
 tracking", arXiv 1603.00831, 2016. Folders: TrackEval, docs/MOTChallenge-Official/Readme.md.
@@ -105,9 +107,9 @@ def _rows(
     confidences: Float[ndarray, " N"],
     positions: Float[ndarray, "N 3"],
 ) -> list[str]:
-    """Return rows of ``frame, id, left, top, width, height, confidence, x, y, z``."""
+    """Return rows as in the module's description."""
     return [
-        f"{frame + 1},{number},{_numbers(box)},{confidence:.6f},{_numbers(place)}\n"
+        f"{frame + 1},{number},{_numbers(box)},{confidence:.6f},-1,-1,-1,{_numbers(place)}\n"
         for frame, number, box, confidence, place in zip(
             frames.tolist(),
             ids.tolist(),

@@ -1,9 +1,9 @@
 """MOTChallenge's det.txt, gt.txt and track files: frame, id, left, top, width, height, …
 
-Frames count from 1. Det files end with confidence and x, y, z (−1 where unknown); ground
-truth from 2016 on with a flag (0: not counted), a class and the visible part. Pixels of the
-challenge's own files count from 1 too (sec. 4.2), those of the detectors and annotation tools that
-borrow the form from 0.
+Frames count from 1. Det files end with confidence and x, y, z (−1 where unknown), to which the
+track files of this program append x, y, z in three more columns; ground truth from 2016 on with a
+flag (0: not counted), a class and the visible part. Pixels of the challenge's own files count from
+1 too (sec. 4.2), those of the detectors and annotation tools that borrow the form from 0.
 
 Source: Milan et al., "MOT16: A benchmark for multi-object tracking", arXiv 1603.00831, 2016.
 """
@@ -36,6 +36,9 @@ LABELS = "labels.txt"
 SEQUENCE = "seqinfo.ini"
 """The description that lies beside the folders ``gt`` and ``det`` of the challenge's sequences."""
 
+_WIDTHS = (6, 7, 8, 9, 10, 13)
+"""Numbers of columns."""
+
 GROUND_PLANE = "-ground-plane"
 """The end of the name of a sequence whose boxes are outlines on the floor in metres, as this
 program exports them."""
@@ -44,7 +47,7 @@ _MOST_LABELS = 2**16  # bytes
 
 
 def recognise(file: SourceFile) -> Certainty:
-    """Rows of 6 to 10 numbers with commas, or blanks, the first two whole and no header."""
+    """Rows of 6 to 10 or 13 numbers with commas, or blanks, the first two whole and no header."""
     rows = [decimal_points(line) for line in file.head_text.splitlines()[:50] if line.strip()]
     rows = rows[:-1] if len(rows) == 50 else rows
     widths = set()
@@ -54,7 +57,7 @@ def recognise(file: SourceFile) -> Certainty:
         if not whole or not all(re.fullmatch(r"-?[\d.]+(e[-+]?\d+)?", w.lower()) for w in words):
             return Certainty.NO
         widths.add(len(words))
-    if len(widths) != 1 or not 6 <= (width := widths.pop()) <= 10:
+    if len(widths) != 1 or (width := widths.pop()) not in _WIDTHS:
         return Certainty.NO
     has_commas = all("," in row for row in rows)
     return Certainty.LIKELY if has_commas and width >= 7 else Certainty.POSSIBLE
@@ -103,8 +106,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
             scores = np.ones(len(table))
     first = 0 if len(frames) and frames.min() == 0 else 1
     placed = np.zeros(len(table), dtype=bool)
-    if columns == 10:
-        placed = (table[:, 7:10] != -1.0).any(axis=1) & (ids >= 0)
+    if columns >= 10:
+        placed = (table[:, -3:] != -1.0).any(axis=1) & (ids >= 0)
     challenge = file.path.parent.parent / SEQUENCE
     if challenge.is_file():
         file.companions.append(challenge)
@@ -127,7 +130,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
             format="MOTChallenge 3D",
             frames=frames[placed],
             ids=ids[placed],
-            positions=table[placed, 7:10],
+            positions=table[placed, -3:],
             up="z",
             first_index=1 if first else 0,
         )
