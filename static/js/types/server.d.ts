@@ -639,7 +639,7 @@ declare namespace Server {
 		unit: "m" | "cm" | "mm" | number | null;
 		/** Axis of the calibration's world that points up. */
 		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
-		/** Where R and t lead. */
+		/** Direction of R and t. */
 		pose: "world-to-camera" | "camera-to-world" | null;
 		/** Axes of a camera: y down and z ahead, or y up and z back. */
 		axes: "opencv" | "opengl" | null;
