@@ -64,7 +64,7 @@ class ListRuns(OfLibrary):
     """List the kept runs, the newest first."""
 
     recording: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
-    """Only those of the recording with this name or folder."""
+    """List only the runs of the recording with this name or folder."""
 
 
 @dataclass
@@ -98,7 +98,7 @@ class ExportRun(OfLibrary):
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """The file to write, of motchallenge the folder. It appears when it is complete."""
     format: FormatName = None
-    """Its form."""
+    """The form of the file."""
     video: OmitArgPrefixes[VideoPart] = field(default_factory=VideoPart)
 
 
@@ -187,7 +187,7 @@ class LibraryCommand(OfLibrary):
         Positional[Literal["check"]], arg(help="Read every page of it and every run's tracks.")
     ]
     repair: FlagCreatePairsOff[bool] = False
-    """Where it is damaged: keep a copy aside, and make a new file of what can be read."""
+    """Keep a copy of a damaged file, and make a new one of what can be read."""
 
 
 _STUDY = arg(
@@ -280,7 +280,7 @@ class BestOfStudy(OfStudies):
 
     study: Annotated[Positional[str | None], _STUDY] = None
     save_as: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
-    """Keep its values as a preset of yours."""
+    """Keep the best values as a preset of yours."""
 
 
 @dataclass
@@ -357,13 +357,13 @@ class Tune(Where, OfStudies):
         arg(metavar="RECORDING …", help="Built-in rooms, or folders.", help_behavior_hint=""),
     ]
     minutes: Annotated[float, limited(float, "a number above 0", 1e-9, 1e4)] = 5.0
-    """How long it seeks."""
+    """The time that the search takes."""
     set: SetValues = ()
-    """One value where you are: what it finds is set against these values, and it tries them too."""
+    """One value where you are: what is found is set against these values, which are tried too."""
     without_truth: FlagCreatePairsOff[bool] = False
     """Do not look at the truth where there is one."""
     save_as: Annotated[str, arg(metavar="NAME")] = "tuned"
-    """The preset that keeps what it found."""
+    """The preset that keeps the better values."""
 
 
 _LOG = arg(metavar="LOG", help="A corrections.toml, or a sequence for its own.")
@@ -464,9 +464,9 @@ class OfferTemplates:
     add: Annotated[
         tuple[int, ...], arg(metavar="NUMBER …", help_behavior_hint="(default: none)")
     ] = ()
-    """Numbers of the list: these become templates."""
+    """Numbers of the suggestions that become templates."""
     add_all: FlagCreatePairsOff[bool] = False
-    """All of them do."""
+    """All suggestions of the list become templates."""
     pictures: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="(optional)")] = None
     """A folder that gets a PNG of each box, to look at before anything is added."""
     seed: FromZero = 0
@@ -481,7 +481,7 @@ class RemoveTemplates:
 
     sequence: SequenceName
     numbers: Annotated[Positional[tuple[int, ...]], arg(metavar="NUMBER …")]
-    """As `templates list` has them."""
+    """Numbers of the templates, as `templates list` shows them."""
 
 
 TemplatesAction = (
@@ -568,7 +568,7 @@ class Import:
     copy: FlagCreatePairsOff[bool] = False
     """Copy videos and pictures, which are otherwise linked."""
     name: str = ""
-    """Of the sequence; the folder's name if it is not given."""
+    """The name of the sequence; the folder's name if it is not given."""
 
 
 @dataclass
@@ -629,4 +629,4 @@ class Parameters:
     """List every parameter with its range, unit, default and meaning."""
 
     json: FlagCreatePairsOff[bool] = False
-    """Print everything as JSON ."""
+    """Print everything as JSON."""
