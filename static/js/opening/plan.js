@@ -36,14 +36,14 @@ export function planPicture(info, words, moved) {
 		const half = Math.min(4.5 * name.length * pixel, wide / 2);
 		// Behind the camera; at an edge of the plan, where there is no room for that, beside it.
 		const behind = v + (Math.sin(way) > 0 ? 14 : -5) * pixel;
-		const y = Math.min(Math.max(behind, 14 * pixel), high - 6 * pixel);
+		const base = Math.min(Math.max(behind, 14 * pixel), high - 6 * pixel);
 		const side = u < wide / 2 ? 1 : -1;
-		const middle = y === behind ? u : u + side * (half + length / 2);
+		const middle = base === behind ? u : u + side * (half + length / 2);
 		return {
 			name,
 			half,
 			x: Math.min(Math.max(middle, half + 4 * pixel), wide - half - 4 * pixel),
-			y,
+			y: base,
 		};
 	});
 	const signs = plan.cameras.map(([x, y, way]) => {
