@@ -335,7 +335,9 @@ class Stream:
                     page.told_timeline = shown
                     told = {"run": shown[1], "done": shown[2], "revision": shown[3]}
                 elif kind == "tasks":
-                    told = {"tasks": results.tasks_of(snapshot)}
+                    told = {
+                        "tasks": {name: one.model_dump() for name, one in snapshot.tasks.items()}
+                    }
                 else:
                     told = {"run": results.run_of(snapshot).model_dump(mode="json")}
                 await socket.send_text(json.dumps({"type": kind, **told}))
