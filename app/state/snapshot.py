@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
+from pydantic import ConfigDict
+
 from app.colours import Theme
 from app.messages import Model
 from app.state.scores import Scores
@@ -57,8 +59,10 @@ run with it, is still being dragged: one edit, one row of runs and one kept run.
 when a slider is let go, and a browser that draws slowly moves one only between two results."""
 
 
-class Trail(Model, frozen=True):
+class Trail(Model):
     """How trails are drawn, in 3D and in pictures."""
+
+    model_config = ConfigDict(frozen=True)
 
     seconds: float = 4.0
     """How far back they go."""
@@ -97,8 +101,10 @@ class RunState:
     """What its result is not: pictures that were missing, files that changed; a sentence each."""
 
 
-class Task(Model, frozen=True):
+class Task(Model):
     """Work in the background: an export, a check of identities, an import, parameters' effects."""
+
+    model_config = ConfigDict(frozen=True)
 
     of: str
     """The number of an export, the key of a run, that of an import, or that of a recording."""
