@@ -64,7 +64,7 @@ class ListRuns(OfLibrary):
     """List the stored runs, the newest first."""
 
     recording: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
-    """Only those of the recording with this name or folder."""
+    """List only the runs of the recording with this name or folder."""
 
 
 @dataclass
@@ -98,7 +98,7 @@ class ExportRun(OfLibrary):
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """The file to write, of motchallenge the folder. It appears when it is complete."""
     format: FormatName = None
-    """Its form."""
+    """The form of the file."""
     video: OmitArgPrefixes[VideoPart] = field(default_factory=VideoPart)
 
 
@@ -280,7 +280,7 @@ class BestOfStudy(OfStudies):
 
     study: Annotated[Positional[str | None], _STUDY] = None
     save_as: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
-    """Keep its values as a preset of yours."""
+    """Keep the best values as a preset of yours."""
 
 
 @dataclass
@@ -464,9 +464,9 @@ class OfferTemplates:
     add: Annotated[
         tuple[int, ...], arg(metavar="NUMBER …", help_behavior_hint="(default: none)")
     ] = ()
-    """Numbers of the list: these become templates."""
+    """Numbers of the suggestions that become templates."""
     add_all: FlagCreatePairsOff[bool] = False
-    """All of them do."""
+    """All suggestions of the list become templates."""
     pictures: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="(optional)")] = None
     """A folder that gets a PNG of each box, to look at before anything is added."""
     seed: FromZero = 0
@@ -481,7 +481,7 @@ class RemoveTemplates:
 
     sequence: SequenceName
     numbers: Annotated[Positional[tuple[int, ...]], arg(metavar="NUMBER …")]
-    """As `templates list` has them."""
+    """Numbers of the templates, as `templates list` shows them."""
 
 
 TemplatesAction = (
@@ -629,4 +629,4 @@ class Parameters:
     """List every parameter with its range, unit, default and meaning."""
 
     json: FlagCreatePairsOff[bool] = False
-    """Print everything as JSON ."""
+    """Print everything as JSON."""

@@ -168,7 +168,7 @@ class Track:
     output: Annotated[Path, arg(aliases=["-o"])]
     """The file to write. It appears when it is complete."""
     format: FormatName = None
-    """Its form; `runs export` lists them."""
+    """The form of the file; `runs export` lists them."""
     single_view: Annotated[
         str | None,
         arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({DEFAULT_RULE})"),

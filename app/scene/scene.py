@@ -146,8 +146,8 @@ class Scene(Follower):
         if another:
             self._set_home(snapshot)
             self._views.home()
-        elif turned:
-            self._views.look(self._pose_of(snapshot), flies=snapshot.flies)
+        if turned or another:
+            self._views.look(self._pose_of(snapshot), flies=snapshot.flies and not another)
 
     @property
     def _through(self) -> int | None:

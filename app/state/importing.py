@@ -403,7 +403,7 @@ class Draft:
         self._stop = threading.Event()
         self._given_up = False
         self._pictures: dict[Path, bytes | None] = {}
-        show(f"import {key}", Task(key, self._known.phase))
+        show(f"import {key}", Task(of=key, state=self._known.phase))
         if source is not None:
             self._look_again()
 
@@ -479,7 +479,9 @@ class Draft:
             version = self._known.version + 1
             self._known = replace(self._known, version=version, **changes)  # type: ignore[arg-type]
             # what is known of it is more than a task tells: its version says when to ask
-            self._show(f"import {self.key}", Task(self.key, self._known.phase, version))
+            self._show(
+                f"import {self.key}", Task(of=self.key, state=self._known.phase, done=version)
+            )
 
     def _look_again(self) -> None:
         """Find everything out in the background; what was under way is given up."""

@@ -195,7 +195,11 @@ class Sensitivity:
         with self._condition:
             of = self._workbench.snapshot().sequence_key
             state = "computing" if self._wanted else "done"
-            told = Task(of, state, self._done, self._total) if self._total else None
+            told = (
+                Task(of=of, state=state, done=self._done, total=self._total)
+                if self._total
+                else None
+            )
         self._workbench.show_task("effects", told)
 
     def _work(self) -> None:

@@ -9,7 +9,10 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
+from pydantic import ConfigDict
+
 from app.colours import Theme
+from app.messages import Model
 from app.state.scores import Scores
 from tracker.corrections import Correction
 from tracker.fusion.trajectories import Trajectories
@@ -56,9 +59,10 @@ run with it, is still being dragged: one edit, one row of runs and one kept run.
 when a slider is let go, and a browser that draws slowly moves one only between two results."""
 
 
-@dataclass(frozen=True, slots=True)
-class Trail:
-    """How the ways of people are drawn, in 3D and in pictures."""
+class Trail(Model):
+    """How trails are drawn, in 3D and in pictures."""
+
+    model_config = ConfigDict(frozen=True)
 
     seconds: float = 4.0
     """How far back they go."""
@@ -97,15 +101,16 @@ class RunState:
     """What its result is not: pictures that were missing, files that changed; a sentence each."""
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
-    """Work in the background that somebody waits for; the pages are told of it as it goes on."""
+class Task(Model):
+    """Work in the background: an export, a check of identities, an import, parameters' effects."""
+
+    model_config = ConfigDict(frozen=True)
 
     of: str
-    """What it is done for: the key of a run, a recording or an import, or the number of an
-    export."""
+    """The number of an export, the key of a run, that of an import, or that of a recording."""
     state: str
     done: int = 0
+    """What is done of :attr:`total`; of an import it is the version that can be read."""
     total: int = 0
     """Steps or bytes; 0 while it is not known."""
     words: str = ""
@@ -204,7 +209,7 @@ class Snapshot:
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people
         default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})
     )
-    trail: Trail = Trail()
+    trail: Trail = field(default_factory=Trail)
     view: View = None
     flies: bool = True
     """Whether changes of the 3D view are animated; false once a page asks for reduced motion."""

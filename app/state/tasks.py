@@ -124,7 +124,10 @@ class Exporter:
 
     def _show(self) -> None:
         now = self._now
-        told = Task(str(now.number), now.state, now.done, now.total, now.name, now.error)
+        told = Task(
+            of=str(now.number), state=now.state, done=now.done, total=now.total,
+            words=now.name, error=now.error,
+        )  # fmt: skip
         self._workbench.show_task("export", told)
 
     def cancel(self) -> None:
@@ -281,7 +284,7 @@ class IdentityCheck:
 
     def _show(self) -> None:
         now = self._now
-        told = Task(now.run, now.state, now.done, now.total, error=now.error)
+        told = Task(of=now.run, state=now.state, done=now.done, total=now.total, error=now.error)
         self._workbench.show_task("identity", told)
 
     def _on_change(self, change: Change) -> None:

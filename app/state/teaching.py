@@ -181,15 +181,14 @@ def at(values: Values, key: str, index: int) -> dict[str, Any]:
     return found[index]
 
 
-def take(found: list[Any], word: str, index: int) -> None:
-    """Take one out of a list.
+def take(values: Values, key: str, index: int) -> None:
+    """Take a table out of a list of tables.
 
     Raises:
         SequenceError: If there is none of that number.
     """
-    if not 0 <= index < len(found):
-        raise SequenceError(f"{word}: expected one of {len(found)}, found number {index + 1}")
-    del found[index]
+    at(values, key, index)
+    del values[key][index]
 
 
 Check = Callable[[Sequence], None]
@@ -448,7 +447,7 @@ class Teaching:
 
     def remove_template(self, index: int) -> None:
         """Take a template away."""
-        self.edit(lambda values: take(values["template"], "template", index))
+        self.edit(lambda values: take(values, "template", index))
 
     def offer_templates(self) -> None:
         """List the templates that the shown run's tracks offer, to be taken or left.
@@ -568,7 +567,7 @@ class Teaching:
 
     def remove_entrance(self, index: int) -> None:
         """Take an entrance away."""
-        self.edit(lambda values: take(values["room"]["entrances"], "entrance", index))
+        self.edit(lambda values: take(values["room"], "entrances", index))
 
     def discard(self) -> None:
         """Have room and templates as the file has them."""

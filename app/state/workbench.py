@@ -407,8 +407,8 @@ class Workbench:
         """Draw trails longer or shorter, seconds, fading or not; None leaves it as it is."""
         with self._edit() as now:
             trail = Trail(
-                now.trail.seconds if seconds is None else seconds,
-                now.trail.fades if fades is None else fades,
+                seconds=now.trail.seconds if seconds is None else seconds,
+                fades=now.trail.fades if fades is None else fades,
             )
             if trail != now.trail:
                 self._put("layers", trail=trail)

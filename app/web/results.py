@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from numpy import ndarray
 
 from app.messages import Model, Vector, filled
-from app.state.snapshot import RunPhase, Snapshot
+from app.state.snapshot import RunPhase, Snapshot, Task, Trail
 from app.web import corrections as corrections
 from app.web.corrections import CorrectionsState
 from tracker.parameters import Topic
@@ -142,30 +142,6 @@ class EditsInfo(Model):
     redo: str | None
 
 
-class TaskInfo(Model):
-    """Work in the background: an export, a check of identities, an import, parameters' effects."""
-
-    of: str
-    """The number of an export, the key of a run, that of an import, or that of a recording."""
-    state: str
-    done: int
-    """What is done of :attr:`total`; of an import it is the version that can be read."""
-    total: int
-    """0 while it is not known."""
-    words: str
-    """What it makes: the name of a file."""
-    error: str | None
-
-
-class TrailInfo(Model):
-    """How trails are drawn, in 3D and in pictures."""
-
-    seconds: float
-    """How far back they go."""
-    fades: bool
-    """Whether they are fainter the older they are."""
-
-
 class ViserInfo(Model):
     """Where the 3D view is."""
 
@@ -200,7 +176,7 @@ class State(Model):
     selection: int | None
     layers: dict[str, bool]
     """Of the 3D view."""
-    trail: TrailInfo
+    trail: Trail
     view: int | Literal["top"] | None
     """What the 3D view looks through: a camera's index, from above, or freely."""
     theme: Literal["dark", "light"]
@@ -212,7 +188,7 @@ class State(Model):
     edits: EditsInfo
     marks: int
     """Grows when kept runs are named, marked, deleted or restored."""
-    tasks: dict[str, TaskInfo]
+    tasks: dict[str, Task]
     """By ``export``, ``identity``, or ``import`` and its key. They come over the socket as they go
     on, and here as they are when something else is told."""
     viser: ViserInfo
@@ -336,7 +312,7 @@ def state_of(snapshot: Snapshot) -> State:
         playhead=snapshot.playhead,
         selection=snapshot.selection,
         layers=dict(snapshot.layers),
-        trail=TrailInfo(**asdict(snapshot.trail)),
+        trail=snapshot.trail,
         view=snapshot.view,
         theme=snapshot.theme,
         run=run_of(snapshot),
@@ -345,14 +321,9 @@ def state_of(snapshot: Snapshot) -> State:
         corrections=corrections.state_of(snapshot),
         edits=EditsInfo(undo=snapshot.undo_words, redo=snapshot.redo_words),
         marks=snapshot.marks,
-        tasks={kind: TaskInfo(**one) for kind, one in tasks_of(snapshot).items()},
+        tasks=dict(snapshot.tasks),
         viser=ViserInfo(),
     )
-
-
-def tasks_of(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
-    """Work in the background, by its kind."""
-    return {kind: asdict(task) for kind, task in snapshot.tasks.items()}
 
 
 def run_of(snapshot: Snapshot) -> RunInfo:

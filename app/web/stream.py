@@ -335,7 +335,9 @@ class Stream:
                     page.sent_timeline = shown
                     message = {"run": shown[1], "done": shown[2], "revision": shown[3]}
                 elif kind == "tasks":
-                    message = {"tasks": results.tasks_of(snapshot)}
+                    message = {
+                        "tasks": {name: one.model_dump() for name, one in snapshot.tasks.items()}
+                    }
                 else:
                     message = {"run": results.run_of(snapshot).model_dump(mode="json")}
                 await socket.send_text(json.dumps({"type": kind, **message}))

@@ -17,7 +17,7 @@ import { teachPanel } from "./taught.js";
 export function mountIdentity({ store, actions }) {
 	const read = fetcher(async () => store.set({ identity: await getJson("/api/identity") }));
 	// It may have been begun in another window, or before this page was loaded.
-	/** @type {Server.TaskInfo | undefined} */
+	/** @type {Server.Task | undefined} */
 	let heard;
 	store.watch(["tasks"], ({ tasks: { identity } }) => {
 		if (JSON.stringify(identity) === JSON.stringify(heard)) return;

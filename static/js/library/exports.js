@@ -67,8 +67,8 @@ export function exportMenu({ store, actions, chosen, say, button = exportButton(
 	/**
 	 * An export, once it is over or another one has taken its place.
 	 * @param {string} number
-	 * @param {(now: Server.TaskInfo) => void} tell  how far it is
-	 * @returns {Promise<Server.TaskInfo>}
+	 * @param {(now: Server.Task) => void} tell  how far it is
+	 * @returns {Promise<Server.Task>}
 	 */
 	const ended = (number, tell) =>
 		new Promise((resolve) => {

@@ -308,7 +308,13 @@ export function mountLibrary(root, { store, actions }) {
 				empty,
 				h(
 					"h3",
-					runs.length ? "No run matches" : isUnderWay() ? "A run is under way" : "Nothing kept yet",
+					runs.length
+						? "No run matches"
+						: library.error
+							? "No runs are kept here"
+							: isUnderWay()
+								? "A run is under way"
+								: "Nothing kept yet",
 				),
 				h("p", library.error ?? "Every run is kept here a few seconds after its end."),
 				// The one that is open is only a tab away.

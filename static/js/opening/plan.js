@@ -33,14 +33,17 @@ export function planPicture(info, words, moved) {
 	const labels = plan.cameras.map(([x, y, way], k) => {
 		const [u, v] = at(x, y);
 		const name = info.cameras[k]?.name ?? "";
-		const half = Math.min(3.5 * name.length * pixel, wide / 2);
-		// Beside the camera where it does not look; inside the plan.
-		const from = Math.sin(way) > 0 ? 14 * pixel : -5 * pixel;
+		const half = Math.min(4.5 * name.length * pixel, wide / 2);
+		// Behind the camera; at an edge of the plan, where there is no room for that, beside it.
+		const behind = v + (Math.sin(way) > 0 ? 14 : -5) * pixel;
+		const base = Math.min(Math.max(behind, 14 * pixel), high - 6 * pixel);
+		const side = u < wide / 2 ? 1 : -1;
+		const middle = base === behind ? u : u + side * (half + length / 2);
 		return {
 			name,
 			half,
-			x: Math.min(Math.max(u, half + 4 * pixel), wide - half - 4 * pixel),
-			y: Math.min(Math.max(v + from, 14 * pixel), high - 6 * pixel),
+			x: Math.min(Math.max(middle, half + 4 * pixel), wide - half - 4 * pixel),
+			y: base,
 		};
 	});
 	const signs = plan.cameras.map(([x, y, way]) => {
@@ -99,8 +102,8 @@ export function planPicture(info, words, moved) {
 				});
 			}),
 		),
-		svg("text.length"),
-		svg("text.length"),
+		svg("text.length", { dy: 22 * pixel }),
+		svg("text.length", { dx: -36 * pixel }),
 		svg("path.scale", { d: `M${mm(scaleX - bar / 2)} ${mm(scaleY)}h${bar}` }),
 		svg("text", { x: mm(scaleX), y: mm(scaleY - 4 * pixel) }, `${bar} m`),
 	);
@@ -172,7 +175,7 @@ function mountFaces(drawing, room, at, moved) {
 		}
 		all(".length", drawing).forEach((text, axis) => {
 			write(text, `${(now[1][axis] - now[0][axis]).toFixed(2)} m`);
-			const to = axis ? [u - width * 0.16, y + height / 2] : [x + width / 2, y + height * 0.1];
+			const to = axis ? [u, y + height / 2] : [x + width / 2, y];
 			text.setAttribute("transform", `translate(${to})`);
 		});
 	}

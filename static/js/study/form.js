@@ -231,7 +231,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, edited) {
 					"span.small",
 					{ title: known?.help },
 					cameras > 1
-						? "do runs backwards and without each camera find the same people? None is best whose people miss the boxes of a camera that was left out"
+						? "do runs backwards and without each camera find the same people? A trial whose people miss the boxes of the camera left out is never the best"
 						: "one camera cannot be left out: only the run backwards is held against it",
 				),
 				byAgreement &&

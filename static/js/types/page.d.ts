@@ -171,7 +171,7 @@ interface PageState {
 	/** Of the run whose identities were checked without truth last. */
 	identity: Server.IdentityInfo | null;
 	/** Work of the server in the background, by its kind. */
-	tasks: Record<string, Server.TaskInfo>;
+	tasks: Record<string, Server.Task>;
 	/** Layouts of somebody's own, by name. */
 	layouts: Record<string, PageState["layout"]>;
 	/** What is plotted of the selected track, by the server's names. */

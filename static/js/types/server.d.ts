@@ -1282,7 +1282,7 @@ declare namespace Server {
 		selection: number | null;
 		/** Of the 3D view. */
 		layers: Record<string, boolean>;
-		trail: TrailInfo;
+		trail: Trail;
 		/** What the 3D view looks through: a camera's index, from above, or freely. */
 		view: number | "top" | null;
 		/** Of the 3D view. */
@@ -1298,7 +1298,7 @@ declare namespace Server {
 		 * By ``export``, ``identity``, or ``import`` and its key. They come over the socket as they go
 		 * on, and here as they are when something else is told.
 		 */
-		tasks: Record<string, TaskInfo>;
+		tasks: Record<string, Task>;
 		viser: ViserInfo;
 	}
 
@@ -1421,13 +1421,13 @@ declare namespace Server {
 	}
 
 	/** Work in the background: an export, a check of identities, an import, parameters' effects. */
-	interface TaskInfo {
+	interface Task {
 		/** The number of an export, the key of a run, that of an import, or that of a recording. */
 		of: string;
 		state: string;
 		/** What is done of :attr:`total`; of an import it is the version that can be read. */
 		done: number;
-		/** 0 while it is not known. */
+		/** Steps or bytes; 0 while it is not known. */
 		total: number;
 		/** What it makes: the name of a file. */
 		words: string;
@@ -1566,7 +1566,7 @@ declare namespace Server {
 	}
 
 	/** How trails are drawn, in 3D and in pictures. */
-	interface TrailInfo {
+	interface Trail {
 		/** How far back they go. */
 		seconds: number;
 		/** Whether they are fainter the older they are. */

@@ -155,6 +155,18 @@ def test_the_nodes_are_a_fixed_set(view: View) -> None:
     assert view.visible("/cameras") == {"/cameras/00", "/cameras/01"}
 
 
+def test_a_camera_chosen_before_the_first_drawing_is_looked_through(
+    of: Sequence, run: Run, looking: Callable[[Workbench], View]
+) -> None:
+    workbench = scene_case.opened(of, run)
+    workbench.look(1)  # as a page does that was there before the server started again
+    view = looking(workbench)
+    assert view.scene.wait(SECONDS)
+    pose = view.scene._views._goal(1.5)  # where a browser is placed that comes now
+    assert pose is not None
+    np.testing.assert_allclose(pose.position, of.cameras[1].centre, atol=1e-6)
+
+
 def test_pools_grow_to_the_need_and_stay(looking: Callable[[Workbench], View]) -> None:
     few, many = scene_case.sequence(2), scene_case.sequence(6, frames=3, name="many")
     view = looking(scene_case.opened(few))

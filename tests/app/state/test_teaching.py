@@ -188,6 +188,7 @@ def test_what_does_not_fit_says_so_and_changes_nothing(client: TestClient) -> No
     assert "[room], max: expected z above that of min, 5, found 2" in words
     words = complaint(command(client, "set_entrance", index=4, part="sigma", axis=0, value=1))
     assert words == "entrances: expected one of 1, found number 5."
+    assert complaint(command(client, "remove_entrance", index=4)) == words
     words = complaint(command(client, "set_entrance", index=0, part="sigma", axis=0, value=0))
     assert "sigma: expected 3 positive numbers" in words
     assert command(client, "set_room_face", side="max", axis=0, value="NaN").status_code == 422

@@ -273,7 +273,7 @@ def _layout() -> dict[str, Any]:
         "paper_bgcolor": SURFACE,
         "plot_bgcolor": SURFACE,
         "font": {"color": INK, "size": 11},
-        "margin": {"l": 70, "r": 20, "t": 34, "b": 44},
+        "margin": {"l": 70, "r": 20, "t": 58, "b": 44},
         "hoverlabel": {"bgcolor": SURFACE, "bordercolor": GRID, "font": {"color": INK}},
         "dragmode": "pan",
     }
