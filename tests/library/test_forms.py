@@ -286,6 +286,14 @@ def test_trackeval_reads_no_position_as_a_class(tmp_path: Path) -> None:
     assert data["num_tracker_dets"] == np.count_nonzero(TRACKS.frames < STEPS)
 
 
+def test_results_have_the_ten_columns_that_py_motmetrics_takes(motchallenge: OfTrackEval) -> None:
+    for path in Path(motchallenge.dataset.tracker_fol).rglob("*.txt"):
+        rows = [line.split(",") for line in path.read_text().splitlines()]
+        assert rows
+        ends = {tuple(row[7:9]) for row in rows}
+        assert ({len(row) for row in rows}, ends) == ({10}, {("-1", "-1")}), path.name
+
+
 def test_each_camera_s_boxes_are_read_by_trackeval(motchallenge: OfTrackEval) -> None:
     for index, camera in enumerate(CAMERAS):
         name = f"{WRITTEN.sequence.name}-{camera.name}"

@@ -1,12 +1,12 @@
 """MOTChallenge text in TrackEval's folders: a file for each camera, and one for the ground plane.
 
-A row is ``frame, id, left, top, width, height, confidence, -1, -1, -1, x, y, z``; frames and ids
-start at 1. Columns 8 to 10 are -1 as in results of the 2D challenge, since TrackEval reads the
-eighth as the class; it ignores the columns after them. In a camera's file the box is the
-reprojected one in pixels, which also start at 1 [MOT16, sec. 4.2]; in the file of the ground plane
-it is the target's outline on the floor in metres. In both, x, y, z are world metres. A person of
-the truth with an uncertain position (``valid = 0``) is written as a distractor: a track that
-matches it counts neither as correct nor as false.
+A row is ``frame, id, left, top, width, height, confidence, -1, -1, -1`` as in results of the 2D
+challenge; frames and ids start at 1. In a camera's file the box is the reprojected one in pixels,
+which also start at 1 [MOT16, sec. 4.2]; in the file of the ground plane it is the target's outline
+on the floor in metres, and the last column is z. There are no other positions: TrackEval reads the
+eighth column as the class, and py-motmetrics refuses more than ten. A person of the truth with an
+uncertain position (``valid = 0``) is written as a distractor: a track that matches it counts
+neither as correct nor as false.
 
 [MOT16] Milan, Leal-Taixé, Reid, Roth, Schindler, "MOT16: a benchmark for multi-object
 tracking", arXiv 1603.00831, 2016. Folders: TrackEval, docs/MOTChallenge-Official/Readme.md.
@@ -56,9 +56,8 @@ def write(folder: Path, run: ExportedRun, options: Options) -> None:
         else:
             boxes, visible = run.boxes[index]
             boxes = boxes + _FROM_1
-        rows = _rows(
-            tracks.frames, tracks.ids, boxes, np.minimum(tracks.existences, 1.0), tracks.positions
-        )
+        last = _numbers(tracks.positions[:, 2].tolist()) if index < 0 else ["-1"] * len(tracks)
+        rows = _rows(tracks.frames, tracks.ids, boxes, np.minimum(tracks.existences, 1.0), last)
         results = folder / "trackers" / "mot_challenge" / f"{BENCHMARK}-{SPLIT}" / TRACKER / "data"
         _save(results / f"{one}.txt", _chosen(rows, visible))
         if truth is None:
@@ -105,19 +104,13 @@ def _rows(
     ids: Int[ndarray, " N"],
     boxes: Float[ndarray, "N 4"],
     confidences: Float[ndarray, " N"],
-    positions: Float[ndarray, "N 3"],
+    last: list[str],
 ) -> list[str]:
-    """Return rows as in the module's description."""
+    """Return rows as in the module's description, with the values of their last column."""
+    columns = (frames.tolist(), ids.tolist(), boxes.tolist(), confidences.tolist(), last)
     return [
-        f"{frame + 1},{number},{_numbers(box)},{confidence:.6f},-1,-1,-1,{_numbers(place)}\n"
-        for frame, number, box, confidence, place in zip(
-            frames.tolist(),
-            ids.tolist(),
-            boxes.tolist(),
-            confidences.tolist(),
-            positions.tolist(),
-            strict=True,
-        )
+        f"{frame + 1},{number},{','.join(_numbers(box))},{confidence:.6f},-1,-1,{end}\n"
+        for frame, number, box, confidence, end in zip(*columns, strict=True)
     ]
 
 
@@ -131,13 +124,13 @@ def _truth_rows(
     """Return rows of ``frame, id, left, top, width, height, counted, class, visibility``."""
     columns = (frames.tolist(), ids.tolist(), boxes.tolist(), counted.tolist(), kinds.tolist())
     return [
-        f"{frame + 1},{number},{_numbers(box)},{counts},{kind},1\n"
+        f"{frame + 1},{number},{','.join(_numbers(box))},{counts},{kind},1\n"
         for frame, number, box, counts, kind in zip(*columns, strict=True)
     ]
 
 
-def _numbers(values: list[float]) -> str:
-    return ",".join(f"{value:.{_CLOSE}f}" for value in values)
+def _numbers(values: list[float]) -> list[str]:
+    return [f"{value:.{_CLOSE}f}" for value in values]
 
 
 def _chosen(rows: list[str], mask: ndarray) -> Iterable[str]:

@@ -1,9 +1,9 @@
 """MOTChallenge's det.txt, gt.txt and track files: frame, id, left, top, width, height, …
 
-Frames count from 1. Det files end with confidence and x, y, z (−1 where unknown), to which the
-track files of this program append x, y, z in three more columns; ground truth from 2016 on with a
-flag (0: not counted), a class and the visible part. Pixels of the challenge's own files count from
-1 too (sec. 4.2), those of the detectors and annotation tools that borrow the form from 0.
+Frames count from 1. Det files end with confidence and x, y, z (−1 where unknown); ground
+truth from 2016 on with a flag (0: not counted), a class and the visible part. Pixels of the
+challenge's own files count from 1 too (sec. 4.2), those of the detectors and annotation tools that
+borrow the form from 0.
 
 Source: Milan et al., "MOT16: A benchmark for multi-object tracking", arXiv 1603.00831, 2016.
 """
@@ -36,18 +36,18 @@ LABELS = "labels.txt"
 SEQUENCE = "seqinfo.ini"
 """The description that lies beside the folders ``gt`` and ``det`` of the challenge's sequences."""
 
-_WIDTHS = (6, 7, 8, 9, 10, 13)
-"""Numbers of columns."""
+TRACKEVAL = "mot_challenge"
+"""The folder of the challenge's sequences and results in those of TrackEval."""
 
 GROUND_PLANE = "-ground-plane"
 """The end of the name of a sequence whose boxes are outlines on the floor in metres, as this
-program exports them."""
+program exports them; the last column of its tracks is z."""
 
 _MOST_LABELS = 2**16  # bytes
 
 
 def recognise(file: SourceFile) -> Certainty:
-    """Rows of 6 to 10 or 13 numbers with commas, or blanks, the first two whole and no header."""
+    """Rows of 6 to 10 numbers with commas, or blanks, the first two whole and no header."""
     rows = [decimal_points(line) for line in file.head_text.splitlines()[:50] if line.strip()]
     rows = rows[:-1] if len(rows) == 50 else rows
     widths = set()
@@ -57,7 +57,7 @@ def recognise(file: SourceFile) -> Certainty:
         if not whole or not all(re.fullmatch(r"-?[\d.]+(e[-+]?\d+)?", w.lower()) for w in words):
             return Certainty.NO
         widths.add(len(words))
-    if len(widths) != 1 or (width := widths.pop()) not in _WIDTHS:
+    if len(widths) != 1 or not 6 <= (width := widths.pop()) <= 10:
         return Certainty.NO
     has_commas = all("," in row for row in rows)
     return Certainty.LIKELY if has_commas and width >= 7 else Certainty.POSSIBLE
@@ -71,18 +71,20 @@ def read(file: SourceFile) -> Iterator[Piece]:
     is_truth = columns in (8, 9) and set(np.unique(table[:, 6])) <= {0.0, 1.0}
     # the ninth number of the ground truth is how much of a person is seen; -1 is of a tracker's
     is_truth &= columns < 9 or bool((table[:, 8] >= 0.0).all())
-    if is_truth and file.path.parent.parent.name.endswith(GROUND_PLANE):
+    name = file.path.parent.parent.name if is_truth else file.path.stem
+    if name.endswith(GROUND_PLANE) and (is_truth or columns == 10):
         middles = boxes[:, :2] + boxes[:, 2:] / 2.0
+        heights = np.full(len(middles), np.nan) if is_truth else table[:, 9]
         yield TruthPiece(
             source=file.path,
             format="MOTChallenge ground plane",
             frames=frames,
             ids=ids,
-            positions=np.column_stack([middles, np.full(len(middles), np.nan)]),
+            positions=np.column_stack([middles, heights]),
             unit="m",
             up="z",
             first_index=1,
-            valid=table[:, 6] == 1.0,
+            valid=table[:, 6] == 1.0 if is_truth else None,
         )
         return
     keep = np.ones(len(table), dtype=bool)
@@ -106,12 +108,12 @@ def read(file: SourceFile) -> Iterator[Piece]:
             scores = np.ones(len(table))
     first = 0 if len(frames) and frames.min() == 0 else 1
     placed = np.zeros(len(table), dtype=bool)
-    if columns >= 10:
-        placed = (table[:, -3:] != -1.0).any(axis=1) & (ids >= 0)
+    if columns == 10:
+        placed = (table[:, 7:10] != -1.0).any(axis=1) & (ids >= 0)
     challenge = file.path.parent.parent / SEQUENCE
     if challenge.is_file():
         file.companions.append(challenge)
-    if placed.any() or challenge.is_file():
+    if placed.any() or challenge.is_file() or TRACKEVAL in file.path.parts:
         boxes = boxes - [1.0, 1.0, 0.0, 0.0]
     yield DetectionPiece(
         source=file.path,
@@ -130,7 +132,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
             format="MOTChallenge 3D",
             frames=frames[placed],
             ids=ids[placed],
-            positions=table[placed, -3:],
+            positions=table[placed, 7:10],
             up="z",
             first_index=1 if first else 0,
         )
