@@ -250,7 +250,8 @@ def main() -> int:
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
     # these go beside the full form, whose tests leave some of both cores
-    mutants = Check("mutants", ((*WAITING, PYTHON, "-m", "tests.mutate", "--workers", "1"),))
+    every_third = ("tests.mutate", "--workers", "1", "--every", "3")
+    mutants = Check("mutants", ((*WAITING, PYTHON, "-m", *every_third),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time
     checked = (*WAITING, *fuzzing(0.0, *always, "--bounds", workers=1))
     checked_kernels = Check("kernels that check their indices", (checked,))
