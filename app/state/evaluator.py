@@ -102,8 +102,9 @@ class Evaluator:
             is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
             if is_new and _named(scored) not in self._failed:
                 computing = snapshot.run_state.state == "computing"
-                if run.complete and computing and run.key == snapshot.run_state.key:
-                    return None, None  # the smoothed people are about to take their place
+                # another run, or the smoothed people, are about to take the place of these tracks
+                if computing and (run.complete or run.key != snapshot.run_state.key):
+                    return None, None
                 over = scored.final or not computing
                 if self._newest != (scored.key, over):
                     self._newest, self._newest_since = (scored.key, over), time.monotonic()

@@ -90,6 +90,26 @@ def test_reducing_is_pruning_merging_and_capping(seed: int, size: int, dimension
     assert_allclose(reduced.covariances, part.covariances, rtol=1e-12, atol=1e-12)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_a_position_has_the_component_whose_nearest_it_is(seed: int) -> None:
+    """As by all distances of a step; places on a small grid, so that many are equal."""
+    rng = np.random.default_rng(seed)
+    counts, numbers = rng.integers(0, 5, 4), rng.integers(0, 6, 4)
+    rows, starts = (np.concatenate([[0], np.cumsum(one)]) for one in (counts, numbers))
+    positions = rng.integers(0, 3, (rows[-1], 3)) * 0.5
+    means = np.concatenate([rng.integers(0, 3, (starts[-1], 3)) * 0.5, np.ones((starts[-1], 1))], 1)
+    weights = rng.choice([0.0, 0.05, 0.5], starts[-1])
+    found = mixtures.nearest_components(positions, rows, weights, means, starts, 0.05, 0.6)
+    for step in range(4):
+        own, sure = positions[rows[step] : rows[step + 1]], slice(starts[step], starts[step + 1])
+        gaps = ((own[:, None] - means[None, sure, :3]) ** 2).sum(axis=2)
+        gaps[:, weights[sure] <= 0.05] = np.inf
+        for i, index in enumerate(found[rows[step] : rows[step + 1]]):
+            best = int(gaps[i].argmin()) if gaps.shape[1] else -1
+            mutual = best >= 0 and gaps[i, best] <= 0.36 and gaps[:, best].argmin() == i
+            assert index == (best if mutual else -1)
+
+
 def test_one_jacobian_for_all_is_as_good_as_one_each() -> None:
     mixture = crowd(5, 30, 4)
     settings = {

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -227,6 +227,25 @@ def test_a_column_is_the_rows_of_all_steps(count: int, written: bool, seed: int)
     )
     only = seen.parts([1])
     assert same(list(only), [(step[1],) for step in views])
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_numbers_of_mappings_are_columns_of_their_names(packed: bool) -> None:
+    rng = np.random.default_rng(1)
+    told: list[dict[str, float]] = [{"a": 1.0}, {}, {"a": 2.0, "b": 3.0}, {"b": 4.0}, {"b": 5}]
+    views = [(replace(random_view(rng), information=one),) for one in told]
+    seen: Steps[Any] = Steps(ViewResult, 1)
+    for view in views[:3]:
+        seen.append(view)
+    assert seen.numbers("information")["a"].tolist()[2:] == [2.0]  # and columns grow afterwards
+    for view in views[3:]:
+        seen.append(view)
+    if packed:
+        seen = through_files(seen, ViewResult, 1)
+    found = seen.numbers("information")
+    for name in ("a", "b"):
+        np.testing.assert_array_equal(found[name], [one.get(name, np.nan) for one in told])
+    assert len(found) == 2
 
 
 def test_a_column_of_several_shapes_or_types_is_refused() -> None:

@@ -149,6 +149,56 @@ def _sort_bits(keys: ndarray, order: ndarray, first: int, last: int) -> None:
 
 
 @kernel
+def nearest_components(
+    positions: ndarray,
+    rows: ndarray,
+    weights: ndarray,
+    means: ndarray,
+    starts: ndarray,
+    least_weight: float,
+    radius: float,
+) -> ndarray:
+    """The component of each position, step by step: each is the nearest one of the other.
+
+    Args:
+        positions: (R, 3), metres, step after step.
+        rows: (S + 1,), index of the first position of each step, and R.
+        weights: (J,), of the components of all steps, step after step.
+        means: (J, d), their states, which begin with the position, metres.
+        starts: (S + 1,), index of the first component of each step, and J.
+        least_weight: Weight that a component must exceed.
+        radius: Distance within which a component is looked for, metres.
+
+    Returns:
+        (R,), index of the component among those of its step, -1 for none.
+    """
+    found = np.full(len(positions), -1, dtype=np.int64)
+    for step in range(len(rows) - 1):
+        for i in range(rows[step], rows[step + 1]):
+            best, least = -1, math.inf
+            for j in range(starts[step], starts[step + 1]):
+                if weights[j] > least_weight:
+                    distance = _squared_gap(positions[i], means[j])
+                    if distance < least:
+                        best, least = j, distance
+            if best < 0 or least > radius * radius:
+                continue
+            nearest = True
+            for k in range(rows[step], rows[step + 1]):
+                distance = _squared_gap(positions[k], means[best])
+                nearest = nearest and (least < distance or (least == distance and i <= k))
+            if nearest:
+                found[i] = best - starts[step]
+    return found
+
+
+@kernel
+def _squared_gap(first: ndarray, second: ndarray) -> float:
+    x, y, z = first[0] - second[0], first[1] - second[1], first[2] - second[2]
+    return float(x * x + y * y + z * z)
+
+
+@kernel
 def heaviest_of_groups(weights: ndarray, group: ndarray, count: int) -> ndarray:
     """The heaviest component of each group 0 … count - 1, the last of equal ones; -1 for none.
 

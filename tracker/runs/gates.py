@@ -8,6 +8,10 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy import ndarray
 
 from tracker.runs.run import Run
 from tracker.single_view.protocol import CANDIDATES, DROPPED, SHAKE, TRUST, UNCERTAINTY
@@ -94,34 +98,31 @@ def count_gates(run: Run) -> list[Gates]:
     """Average the counts of every camera; cameras whose method reports none are left out."""
     gates = []
     for number, view in enumerate(run.sequence.views):
-        boxes = run.views.column("boxes", number).counts.tolist()
-        counted = [
-            (information, count)
-            for information, count in zip(
-                run.views.values("information", number), boxes, strict=True
-            )
-            if CANDIDATES in information
-        ]
-        if not counted:
+        numbers = run.views.numbers("information", number)
+        if CANDIDATES not in numbers:
             continue
-        counts = [information for information, _ in counted]
-        names = dict.fromkeys(name for one in counts for name in one if name.startswith(DROPPED))
+        counted = ~np.isnan(numbers[CANDIDATES])
+        mean = partial(_mean, {name: values[counted] for name, values in numbers.items()})
         gates.append(
             Gates(
                 camera=view.camera.name,
-                pictures=len(counted),
-                candidates=_mean(counts, CANDIDATES),
-                dropped={name.removeprefix(DROPPED): _mean(counts, name) for name in names},
-                passed=sum(count for _, count in counted) / len(counted),
-                trust=_mean(counts, TRUST, 1.0),
-                uncertainty=_mean(counts, UNCERTAINTY),
+                pictures=int(counted.sum()),
+                candidates=mean(CANDIDATES),
+                dropped={
+                    name.removeprefix(DROPPED): mean(name)
+                    for name in numbers
+                    if name.startswith(DROPPED)
+                },
+                passed=float(run.views.column("boxes", number).counts[counted].mean()),
+                trust=mean(TRUST, 1.0),
+                uncertainty=mean(UNCERTAINTY),
             )
         )
     return gates
 
 
-def _mean(counts: list[dict[str, float]], name: str, otherwise: float = 0.0) -> float:
-    return sum(one.get(name, otherwise) for one in counts) / len(counts)
+def _mean(numbers: dict[str, ndarray], name: str, otherwise: float = 0.0) -> float:
+    return float(np.nan_to_num(numbers.get(name, np.array([otherwise])), nan=otherwise).mean())
 
 
 def decisive_gate(run: Run) -> str | None:
@@ -183,8 +184,8 @@ def notices(run: Run) -> list[str]:
             f"still is found with a template; {_EMPTY}"
         )
     for number, view in enumerate(run.sequence.views):
-        every = run.views.values("information", number)
-        shake = max((information.get(SHAKE, 0.0) for information in every), default=0.0)
+        every = run.views.numbers("information", number).get(SHAKE, np.zeros(1))
+        shake = np.nanmax(every)
         if shake > 0.0:
             found.append(
                 f'camera "{view.camera.name}" shakes by {shake:.1f} pixels: its pictures are held '

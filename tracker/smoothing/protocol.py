@@ -18,6 +18,7 @@ from numpy import ndarray
 from tracker.corrections import Correction
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Bounds, Trajectories
+from tracker.kernels.mixtures import nearest_components
 from tracker.parameters.catalogue import RunParameters
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -273,24 +274,21 @@ def _components(
     smoothed: Smoothed, rows: Int[ndarray, " R"], fused: Many[FusionResult], near: float
 ) -> tuple[Int[ndarray, " R"], Int[ndarray, " R"]]:
     """The nearest component of the step's posterior and its label, -1 where none is near."""
-    components = np.full(len(rows), -1, dtype=np.int64)
     labels = np.full(len(rows), -1, dtype=np.int64)
-    frames = smoothed.frames[rows]
     column = Steps.of(fused, FusionResult).column
     weights, means = column("posterior.weights"), column("posterior.means")
-    own_labels = column("posterior.labels")
-    bounds = np.searchsorted(frames, np.arange(len(weights) + 1))
-    for step in range(len(weights)):
-        own = slice(int(bounds[step]), int(bounds[step + 1]))
-        sure = np.flatnonzero(weights[step] > _FAINT)
-        if own.stop == own.start or not len(sure):
-            continue
-        gaps = smoothed.means[rows[own], None, :3] - means[step][None, sure, :3]
-        distances = (gaps**2).sum(axis=2)
-        best = distances.argmin(axis=1)
-        good = distances[np.arange(len(best)), best] <= near * near
-        # a component belongs to one track: the nearest of those near it
-        closest = distances.argmin(axis=0)[best] == np.arange(len(best))
-        components[own] = np.where(good & closest, sure[best], -1)
-        labels[own] = np.where(good & closest, own_labels[step][sure[best]], -1)
+    if not len(weights.values):
+        return labels, labels.copy()
+    frames = smoothed.frames[rows]
+    components = nearest_components(
+        np.ascontiguousarray(smoothed.means[rows, :3]),
+        np.searchsorted(frames, np.arange(len(weights) + 1)),
+        weights.values,
+        means.values,
+        weights.starts,
+        _FAINT,
+        near,
+    )
+    own, of_component = components >= 0, column("posterior.labels")
+    labels[own] = of_component.values[of_component.starts[frames[own]] + components[own]]
     return components, labels

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast, overload
 
 import numpy as np
-from jaxtyping import Int, Shaped
+from jaxtyping import Float, Int, Shaped
 from numpy import ndarray
 
 from tracker.steps.columns import Alike, Block, Column, flat, plan_of, whole
@@ -66,6 +66,17 @@ class _Now(NamedTuple):
     newest: list[Any]
 
 
+class _Newest(NamedTuple):
+    """What was read of the newest steps as columns, as long as no step is added."""
+
+    values: list[Any]
+    steps: int
+    fields: dict[int, list[list[Any]]]
+    """For a part the values of each field."""
+    columns: dict[tuple[int, int], Column]
+    """The columns by part and index."""
+
+
 class Steps(Sequence[T]):
     """What one stage made, one value a step, stored as a few long arrays.
 
@@ -84,6 +95,7 @@ class Steps(Sequence[T]):
         self._kind, self._width = kind, width
         self._plan = plan_of(cast("Hashable", kind))
         self._now = _Now((0,), (), [])
+        self._read = _Newest([], 0, {}, {})
 
     @staticmethod
     def of(values: Iterable[T], kind: type[Any], width: int | None = None) -> Steps[T]:
@@ -239,6 +251,26 @@ class Steps(Sequence[T]):
             for k in range(low, high):
                 yield column.at(k)
 
+    def numbers(self, name: str, part: int = 0) -> dict[str, Float[ndarray, " S"]]:
+        """Return the numbers of a field of mappings by their names; nan where a step has none.
+
+        Args:
+            name: The field, as for :meth:`column`.
+            part: Index of the part of each value.
+        """
+        found: dict[str, ndarray] = {}
+        begin, count = 0, len(self)
+        for low, high, steps, column in self._columns(name, part, 0, count):
+            for index, (form, rows) in enumerate(zip(column.forms, column.rows, strict=True)):
+                own = np.arange(steps) if column.which is None else column.which == index
+                for k, each in enumerate(form.names or form.value or ()):
+                    numbers = found.setdefault(each, np.full(count, np.nan))
+                    numbers[begin : begin + steps][own] = (
+                        form.value[each] if rows is None else rows[:, k]
+                    )
+            begin += high - low
+        return found
+
     def write(self, folder: Path, key: str = "") -> None:
         """Write all steps into an existing empty folder: ``head.json``, and arrays as ``.npy``.
 
@@ -360,10 +392,21 @@ class Steps(Sequence[T]):
         begin = now.firsts[-1]
         low, high = max(first - begin, 0), last - begin
         if low < high:
-            newest = now.newest[low:high]
-            own = newest if self._width is None else [value[part] for value in newest]
-            packed = flat(self._plan, own)[index]
-            yield 0, high - low, high - low, Alike().column(packed, self._plan.seconds[index])
+            steps = stop - begin
+            yield low, high, steps, self._newest_column(now.newest, steps, part, index)
+
+    def _newest_column(self, values: list[Any], steps: int, part: int, index: int) -> Column:
+        read = self._read
+        if read.values is not values or read.steps != steps:
+            read = self._read = _Newest(values, steps, {}, {})
+        if (part, index) not in read.columns:
+            if part not in read.fields:
+                own = values[:steps]
+                own = own if self._width is None else [value[part] for value in own]
+                read.fields[part] = flat(self._plan, own)
+            fields = read.fields[part][index]
+            read.columns[part, index] = Alike().column(fields, self._plan.seconds[index])
+        return read.columns[part, index]
 
 
 def _restored(kind: type[Any], width: int | None, now: _Now) -> Steps[Any]:

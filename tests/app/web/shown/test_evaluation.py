@@ -6,6 +6,7 @@ import html
 import json
 import re
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -321,6 +322,19 @@ def test_a_run_under_way_is_scored_when_its_time_has_come_and_at_its_end(
     evaluator.close()
     assert len(calls) >= midway + 1 if midway else len(calls) == 1
     assert set(calls) == {"evaluation"}
+
+
+def test_tracks_whose_place_another_run_is_about_to_take_are_not_scored(bench: Workbench) -> None:
+    """While a slider is dragged, their figures would only keep the next run waiting."""
+    first = compute(bench)
+    bench.set_parameters({P_D: 0.5}, "test")
+    bench.run_begins("another")
+    evaluator = Evaluator(bench)
+    time.sleep(2.0 * worker.SETTLED_SECONDS)
+    assert shown(bench) is None
+    bench.run_ends("another", "cancelled")
+    wait_until(lambda: shown(bench) == (first.key, FRAMES))
+    evaluator.close()
 
 
 @pytest.mark.full
