@@ -160,8 +160,8 @@ def distances_by_step(
     ends = np.cumsum(sizes)
     step = np.repeat(np.arange(truth.steps), sizes)
     place = np.arange(len(step)) - np.repeat(ends - sizes, sizes)
-    first = truth.positions[truth.offsets[step] + place // np.maximum(columns[step], 1)]
-    second = tracks.positions[tracks.offsets[step] + place % np.maximum(columns[step], 1)]
+    first = truth.positions[truth.offsets[step] + place // columns[step]]
+    second = tracks.positions[tracks.offsets[step] + place % columns[step]]
     flat = measure.between(first, second)
     return tuple(
         flat[end - size : end].reshape(g, e)
