@@ -8,6 +8,7 @@ from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
 from tests.random_rooms import random_room
+from tracker.geometry.consistency import consensus
 from tracker.geometry.consistency.likelihood import (
     Evidence,
     Moments,
@@ -96,3 +97,10 @@ def test_log_odds_need_every_part_of_a_recording() -> None:
     assert log_odds(zero, steady) == -log_odds(steady, zero)
     assert log_odds(steady, steady) == 0.0
     assert log_odds(0.01 * steady, zero) == pytest.approx(0.01 * steady.sum())  # never above ΔE
+
+
+def test_a_pair_of_boxes_counts_where_no_other_pair_of_either_is_closer() -> None:
+    """Box 1 of the second camera is closest to a box that is closer to another: it has no pair."""
+    first, second = np.array([0, 0, 1, 2]), np.array([1, 0, 1, 2])
+    kept = consensus._one_to_one(first, second, np.array([0.2, 0.1, 0.3, 0.4]))
+    assert kept.tolist() == [1, 3]
