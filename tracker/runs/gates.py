@@ -122,7 +122,8 @@ def count_gates(run: Run) -> list[Gates]:
 
 
 def _mean(numbers: dict[str, ndarray], name: str, otherwise: float = 0.0) -> float:
-    return float(np.nan_to_num(numbers.get(name, np.array([otherwise])), nan=otherwise).mean())
+    values = numbers.get(name, np.array([otherwise]))
+    return float(np.where(np.isnan(values), otherwise, values).mean())
 
 
 def decisive_gate(run: Run) -> str | None:

@@ -260,15 +260,15 @@ class Steps(Sequence[T]):
         """
         found: dict[str, ndarray] = {}
         begin, count = 0, len(self)
-        for low, high, steps, column in self._columns(name, part, 0, count):
+        for _, high, _, column in self._columns(name, part, 0, count):
             for index, (form, rows) in enumerate(zip(column.forms, column.rows, strict=True)):
-                own = np.arange(steps) if column.which is None else column.which == index
+                own = np.arange(high)
+                if column.which is not None:
+                    own = np.flatnonzero(column.which[:high] == index)
                 for k, each in enumerate(form.names or form.value or ()):
                     numbers = found.setdefault(each, np.full(count, np.nan))
-                    numbers[begin : begin + steps][own] = (
-                        form.value[each] if rows is None else rows[:, k]
-                    )
-            begin += high - low
+                    numbers[begin + own] = form.value[each] if rows is None else rows[: len(own), k]
+            begin += high
         return found
 
     def write(self, folder: Path, key: str = "") -> None:
