@@ -77,9 +77,8 @@ class Evaluator:
     def _score(self, scored: Scored) -> Evaluation:
         tracks = scored.tracks
         rows = slice(0, tracks.at(scored.steps).start)
-        columns = (getattr(tracks, name)[rows] for name in type(tracks).__slots__)
         return evaluate_sequence(
-            scored.sequence, type(tracks)(*columns), self.settings, steps=scored.steps
+            scored.sequence, tracks.take(rows), self.settings, steps=scored.steps
         )
 
     def _on_change(self, change: Change) -> None:
@@ -102,7 +101,7 @@ class Evaluator:
             is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
             if is_new and _named(scored) not in self._failed:
                 computing = snapshot.run_state.state == "computing"
-                # another run, or the smoothed people, are about to take the place of these tracks
+                # these tracks are about to be replaced, by another run or by their smoothed ones
                 if computing and (run.complete or run.key != snapshot.run_state.key):
                     return None, None
                 over = scored.final or not computing

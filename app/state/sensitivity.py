@@ -195,12 +195,12 @@ class Sensitivity:
         with self._condition:
             of = self._workbench.snapshot().sequence_key
             state = "computing" if self._wanted else "done"
-            told = (
+            task = (
                 Task(of=of, state=state, done=self._done, total=self._total)
                 if self._total
                 else None
             )
-        self._workbench.show_task("effects", told)
+        self._workbench.show_task("effects", task)
 
     def _work(self) -> None:
         be_nice()

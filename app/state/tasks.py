@@ -124,11 +124,11 @@ class Exporter:
 
     def _show(self) -> None:
         now = self._now
-        told = Task(
+        task = Task(
             of=str(now.number), state=now.state, done=now.done, total=now.total,
             words=now.name, error=now.error,
         )  # fmt: skip
-        self._workbench.show_task("export", told)
+        self._workbench.show_task("export", task)
 
     def cancel(self) -> None:
         """Stop what is under way; nothing of it is left."""
@@ -284,8 +284,8 @@ class IdentityCheck:
 
     def _show(self) -> None:
         now = self._now
-        told = Task(of=now.run, state=now.state, done=now.done, total=now.total, error=now.error)
-        self._workbench.show_task("identity", told)
+        task = Task(of=now.run, state=now.state, done=now.done, total=now.total, error=now.error)
+        self._workbench.show_task("identity", task)
 
     def _on_change(self, change: Change) -> None:
         if change in ("sequence", "run") and self._now.state == "looking":

@@ -93,11 +93,10 @@ def begin(
         if form.needs_truth and not run.finished:
             raise not_finished("has a report", done, frames)
         rows = slice(0, run.tracks.at(done).start)
-        columns = (getattr(run.tracks, name)[rows] for name in type(run.tracks).__slots__)
         named = now.named(run.sequence)
         written = ExportedRun(
             named,
-            type(run.tracks)(*columns),
+            run.tracks.take(rows),
             run.parameters,
             run.seed,
             done,

@@ -496,17 +496,19 @@ def main() -> int:
     known = {one["trial"] for one in map(json.loads, arguments.file.read_text().splitlines())}
     left = [trial for trial in range(arguments.trials) if trial not in known]
     with ProcessPoolExecutor(arguments.workers) as pool:
-        shares = [left[share :: arguments.workers] for share in range(arguments.workers)]
+        shares = [left[first :: arguments.workers] for first in range(arguments.workers)]
         running = [
-            pool.submit(run_trials, arguments.file, arguments.seed, share) for share in shares
+            pool.submit(run_trials, arguments.file, arguments.seed, share)
+            for share in shares
+            if share
         ]
         for one in running:
             one.result()
-    told = [json.loads(line) for line in arguments.file.read_text().splitlines()]
-    counts = Counter((one["fault"], one["outcome"]) for one in told)
+    rows = [json.loads(line) for line in arguments.file.read_text().splitlines()]
+    counts = Counter((one["fault"], one["outcome"]) for one in rows)
     words = ", ".join(f"{fault}: {count} {how}" for (fault, how), count in sorted(counts.items()))
-    print(f"faults: {len(told)} trials: {words}", flush=True)
-    return 1 if any(one["outcome"] == "fell" for one in told) else 0
+    print(f"faults: {len(rows)} trials: {words}", flush=True)
+    return 1 if any(one["outcome"] == "fell" for one in rows) else 0
 
 
 if __name__ == "__main__":

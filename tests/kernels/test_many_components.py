@@ -92,7 +92,7 @@ def test_reducing_is_pruning_merging_and_capping(seed: int, size: int, dimension
 
 @given(st.integers(0, 2**32 - 1))
 def test_a_position_has_the_component_whose_nearest_it_is(seed: int) -> None:
-    """As by all distances of a step; places on a small grid, so that many are equal."""
+    """The kernel finds what all distances of a step give, on a small grid with many equal ones."""
     rng = np.random.default_rng(seed)
     counts, numbers = rng.integers(0, 5, 4), rng.integers(0, 6, 4)
     rows, starts = (np.concatenate([[0], np.cumsum(one)]) for one in (counts, numbers))

@@ -279,7 +279,7 @@ def test_trackeval_and_evaluate_agree_on_the_ground_plane(motchallenge: OfTrackE
 
 
 def test_trackeval_reads_no_position_as_a_class(tmp_path: Path) -> None:
-    """Its reader takes the eighth number for the class, and refuses classes above 1."""
+    """TrackEval takes the eighth number for the class, and refuses classes above 1."""
     away = replace(TRACKS, positions=TRACKS.positions + 7.0)
     save(tmp_path / "mot", FORMATS["motchallenge"], replace(WRITTEN, tracks=away))
     data = OfTrackEval(tmp_path / "mot").data(f"{WRITTEN.sequence.name}-ground-plane")
@@ -292,6 +292,9 @@ def test_results_have_the_ten_columns_that_py_motmetrics_takes(motchallenge: OfT
         assert rows
         ends = {tuple(row[7:9]) for row in rows}
         assert ({len(row) for row in rows}, ends) == ({10}, {("-1", "-1")}), path.name
+        on_ground = path.stem.endswith("ground-plane")
+        heights = set(TRACKS.positions[:, 2].round(10).tolist()) if on_ground else {-1.0}
+        assert {float(row[9]) for row in rows} <= heights, path.name
 
 
 def test_each_camera_s_boxes_are_read_by_trackeval(motchallenge: OfTrackEval) -> None:

@@ -229,8 +229,11 @@ def test_a_column_is_the_rows_of_all_steps(count: int, written: bool, seed: int)
     assert same(list(only), [(step[1],) for step in views])
 
 
-@pytest.mark.parametrize("packed", [False, True])
-def test_numbers_of_mappings_are_columns_of_their_names(packed: bool) -> None:
+@pytest.mark.parametrize(("block", "written"), [(256, False), (256, True), (2, False)])
+def test_numbers_of_mappings_are_columns_of_their_names(
+    monkeypatch: pytest.MonkeyPatch, block: int, written: bool
+) -> None:
+    monkeypatch.setattr(steps, "BLOCK", block)
     rng = np.random.default_rng(1)
     told: list[dict[str, float]] = [{"a": 1.0}, {}, {"a": 2.0, "b": 3.0}, {"b": 4.0}, {"b": 5}]
     views = [(replace(random_view(rng), information=one),) for one in told]
@@ -240,7 +243,7 @@ def test_numbers_of_mappings_are_columns_of_their_names(packed: bool) -> None:
     assert seen.numbers("information")["a"].tolist()[2:] == [2.0]  # and columns grow afterwards
     for view in views[3:]:
         seen.append(view)
-    if packed:
+    if written:
         seen = through_files(seen, ViewResult, 1)
     found = seen.numbers("information")
     for name in ("a", "b"):

@@ -151,32 +151,34 @@ def _sort_bits(keys: ndarray, order: ndarray, first: int, last: int) -> None:
 @kernel
 def nearest_components(
     positions: ndarray,
-    rows: ndarray,
+    position_starts: ndarray,
     weights: ndarray,
     means: ndarray,
-    starts: ndarray,
+    component_starts: ndarray,
     least_weight: float,
     radius: float,
 ) -> ndarray:
-    """The component of each position, step by step: each is the nearest one of the other.
+    """Find for each position the component that is nearest to it and to which it is nearest.
+
+    Positions and components are compared within a step only; of equal distances the first counts.
 
     Args:
-        positions: (R, 3), metres, step after step.
-        rows: (S + 1,), index of the first position of each step, and R.
-        weights: (J,), of the components of all steps, step after step.
+        positions: (R, 3), of all steps in turn, metres.
+        position_starts: (S + 1,), index of the first position of each step, and R.
+        weights: (J,), of the components of all steps in turn.
         means: (J, d), their states, which begin with the position, metres.
-        starts: (S + 1,), index of the first component of each step, and J.
+        component_starts: (S + 1,), index of the first component of each step, and J.
         least_weight: Weight that a component must exceed.
-        radius: Distance within which a component is looked for, metres.
+        radius: Largest distance between a position and its component, metres.
 
     Returns:
         (R,), index of the component among those of its step, -1 for none.
     """
     found = np.full(len(positions), -1, dtype=np.int64)
-    for step in range(len(rows) - 1):
-        for i in range(rows[step], rows[step + 1]):
+    for step in range(len(position_starts) - 1):
+        for i in range(position_starts[step], position_starts[step + 1]):
             best, least = -1, math.inf
-            for j in range(starts[step], starts[step + 1]):
+            for j in range(component_starts[step], component_starts[step + 1]):
                 if weights[j] > least_weight:
                     distance = _squared_gap(positions[i], means[j])
                     if distance < least:
@@ -184,16 +186,17 @@ def nearest_components(
             if best < 0 or least > radius * radius:
                 continue
             nearest = True
-            for k in range(rows[step], rows[step + 1]):
+            for k in range(position_starts[step], position_starts[step + 1]):
                 distance = _squared_gap(positions[k], means[best])
                 nearest = nearest and (least < distance or (least == distance and i <= k))
             if nearest:
-                found[i] = best - starts[step]
+                found[i] = best - component_starts[step]
     return found
 
 
 @kernel
 def _squared_gap(first: ndarray, second: ndarray) -> float:
+    """The squared distance of two places, square metres."""
     x, y, z = first[0] - second[0], first[1] - second[1], first[2] - second[2]
     return float(x * x + y * y + z * z)
 

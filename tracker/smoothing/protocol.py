@@ -273,7 +273,7 @@ def names_of(smoothed: Smoothed, tracks: Trajectories) -> dict[int, int]:
 def _components(
     smoothed: Smoothed, rows: Int[ndarray, " R"], fused: Many[FusionResult], near: float
 ) -> tuple[Int[ndarray, " R"], Int[ndarray, " R"]]:
-    """The nearest component of the step's posterior and its label, -1 where none is near."""
+    """Find each row's nearest component of its step's posterior, and its label; -1 for none."""
     labels = np.full(len(rows), -1, dtype=np.int64)
     column = Steps.of(fused, FusionResult).column
     weights, means = column("posterior.weights"), column("posterior.means")

@@ -66,8 +66,8 @@ class _Now(NamedTuple):
     newest: list[Any]
 
 
-class _Newest(NamedTuple):
-    """What was read of the newest steps as columns, as long as no step is added."""
+class _NewestColumns(NamedTuple):
+    """The columns of the newest steps that were read, valid until a step is added."""
 
     values: list[Any]
     steps: int
@@ -95,7 +95,7 @@ class Steps(Sequence[T]):
         self._kind, self._width = kind, width
         self._plan = plan_of(cast("Hashable", kind))
         self._now = _Now((0,), (), [])
-        self._read = _Newest([], 0, {}, {})
+        self._newest_columns = _NewestColumns([], 0, {}, {})
 
     @staticmethod
     def of(values: Iterable[T], kind: type[Any], width: int | None = None) -> Steps[T]:
@@ -118,6 +118,7 @@ class Steps(Sequence[T]):
         if len(newest) >= BLOCK:
             block = self._packed(newest)
             self._now = _Now((*firsts, firsts[-1] + block.steps), (*blocks, block), [])
+            self._newest_columns = _NewestColumns([], 0, {}, {})  # else it holds these steps
 
     def shared(self) -> Steps[T]:
         """Return a copy to go on from; only the newest steps are copied."""
@@ -252,7 +253,7 @@ class Steps(Sequence[T]):
                 yield column.at(k)
 
     def numbers(self, name: str, part: int = 0) -> dict[str, Float[ndarray, " S"]]:
-        """Return the numbers of a field of mappings by their names; nan where a step has none.
+        """Return the numbers of a field of mappings, by name; nan at steps that lack the name.
 
         Args:
             name: The field, as for :meth:`column`.
@@ -396,9 +397,9 @@ class Steps(Sequence[T]):
             yield low, high, steps, self._newest_column(now.newest, steps, part, index)
 
     def _newest_column(self, values: list[Any], steps: int, part: int, index: int) -> Column:
-        read = self._read
+        read = self._newest_columns
         if read.values is not values or read.steps != steps:
-            read = self._read = _Newest(values, steps, {}, {})
+            read = self._newest_columns = _NewestColumns(values, steps, {}, {})
         if (part, index) not in read.columns:
             if part not in read.fields:
                 own = values[:steps]

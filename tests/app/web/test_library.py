@@ -23,8 +23,8 @@ P_D = "fusion.detection_probability"
 
 
 @pytest.fixture(autouse=True)
-def kept_soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody drags a slider here, which a run that is to be kept waits for."""
+def nobody_drags(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run is stored soon after its end: it waits no longer for a slider that is being dragged."""
     monkeypatch.setattr(keeper, "DRAG_SECONDS", 0.2)
 
 

@@ -220,9 +220,8 @@ def track_variant(
 def reverse_steps(tracks: Trajectories, steps: int) -> Trajectories:
     """Reverse the steps 0 … ``steps`` − 1 of tracks; rows are again sorted by step and then id."""
     order = np.lexsort((tracks.ids, -tracks.frames))
-    columns = {name: getattr(tracks, name)[order] for name in Trajectories.__slots__}
-    columns["frames"] = steps - 1 - columns["frames"]
-    return Trajectories(**columns)
+    ordered = tracks.take(order)
+    return replace(ordered, frames=steps - 1 - ordered.frames)
 
 
 def overlap(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import json
 import re
@@ -329,12 +330,11 @@ def test_tracks_whose_place_another_run_is_about_to_take_are_not_scored(bench: W
     first = compute(bench)
     bench.set_parameters({P_D: 0.5}, "test")
     bench.run_begins("another")
-    evaluator = Evaluator(bench)
-    time.sleep(2.0 * worker.SETTLED_SECONDS)
-    assert shown(bench) is None
-    bench.run_ends("another", "cancelled")
-    wait_until(lambda: shown(bench) == (first.key, FRAMES))
-    evaluator.close()
+    with contextlib.closing(Evaluator(bench)):
+        time.sleep(2.0 * worker.SETTLED_SECONDS)
+        assert shown(bench) is None
+        bench.run_ends("another", "cancelled")
+        wait_until(lambda: shown(bench) == (first.key, FRAMES))
 
 
 @pytest.mark.full
