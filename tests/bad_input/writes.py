@@ -113,7 +113,7 @@ def save(folder: Path, number: int) -> None:
 
 def saved(folder: Path) -> int:
     sequence = read_sequence(folder / "room")
-    for backup in (folder / "room").glob("*.bak*"):
+    for backup in (folder / "room").glob(f"{saving.BACKUP}*"):
         assert "format" in backup.read_text(encoding="utf-8")  # none is empty or cut off
     return max(0, round((float(sequence.room.maximum[0]) - 2.0) / STEP))
 

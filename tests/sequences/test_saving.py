@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import copy
 import os
+import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import pytest
@@ -15,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import write_sequence
+from tracker.files import atomic
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.errors import SequenceError
@@ -187,6 +190,29 @@ def test_a_save_keeps_what_was_there_and_reads_back(folder: Path) -> None:
     assert backup.read_bytes() == before
     assert taught_values(read_sequence(folder)) == taught_values(opened)
     assert sorted(p.name for p in folder.iterdir() if p.name.startswith(".")) == []
+
+
+def test_at_no_line_of_a_save_is_a_file_there_that_is_not_whole(folder: Path) -> None:
+    """A process may be killed between any two lines."""
+    before = (folder / FILE).read_bytes()
+    opened = read_sequence(folder)
+    changed = taught(opened, add)
+    seen: set[tuple[str, bytes]] = set()
+
+    def look(frame: FrameType, event: str, value: object) -> Any:
+        if frame.f_code.co_filename not in (saving.__file__, atomic.__file__):
+            return None
+        for file in folder.glob(f"{FILE}*"):
+            seen.add((file.name, file.read_bytes()))
+        return look
+
+    sys.settrace(look)
+    try:
+        backup = saving.save(changed, opened)
+    finally:
+        sys.settrace(None)
+    after = (folder / FILE).read_bytes()
+    assert seen == {(FILE, before), (backup.name, before), (FILE, after)}
 
 
 def test_line_ends_and_the_byte_order_mark_stay(folder: Path) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT
 
-from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder
+from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder, write_whole
 from tracker.files.folders import cache_folder
 from tracker.sequences.built_in import built_in_name
 from tracker.sequences.errors import SequenceError
@@ -63,8 +63,6 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         SequenceError: If the file may not be written, or its room, target or templates were
             changed meanwhile by another program; it is then unchanged.
     """
-    from tracker.sequences.writing.saving import rewritten
-
     folder, where = sequence.folder, f"{sequence.folder.name}/{FILE}"
     reason = why_not_in_place(folder)
     if reason is not None:
@@ -103,8 +101,6 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
     Raises:
         SequenceError: If the copy cannot be written; no file is left then.
     """
-    from tracker.sequences.writing.saving import rewritten
-
     source, built_in = sequence.folder, built_in_name(sequence.folder) is not None
     folder = given_folder(folder).absolute()
     _check_place(folder, source)
@@ -174,23 +170,12 @@ def _copy(path: Path, place: Path, *, link: bool) -> None:
 
 def _keep(folder: Path, data: bytes) -> Path:
     """Write a backup beside the file, under a name that does not exist yet."""
-    number = 1
-    while True:
-        path = folder / (BACKUP if number == 1 else f"{BACKUP}{number}")
-        try:
-            file = path.open("xb")
-        except FileExistsError:
-            number += 1
-            continue
-        try:
-            with file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-        except BaseException:
-            path.unlink(missing_ok=True)  # an empty backup would be taken for one
-            raise
-        return path
+    path, number = folder / BACKUP, 1
+    while path.exists():
+        number += 1
+        path = folder / f"{BACKUP}{number}"
+    write_whole(path, data)  # a half-written backup would be taken for a whole one
+    return path
 
 
 @contextlib.contextmanager
