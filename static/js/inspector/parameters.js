@@ -534,4 +534,6 @@ export function mountParameters(root, { store, actions }) {
 		list();
 		foot();
 	});
+	// Until here a click would have been lost.
+	root.inert = false;
 }

@@ -213,4 +213,6 @@ export function mountTables(root, context) {
 		write(place, events.length ? `${past} of ${events.length}` : "");
 	});
 	store.watch(["eventKind"], ({ eventKind }) => (kind.value = eventKind));
+	// Until here a click would have been lost.
+	for (const name of ["events", "compare"]) one(`#panel-${name}`, root).inert = false;
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, TimeoutError, expect
 
 from tests.browser.looking import as_at_first
 from tests.browser.serving import Server
@@ -79,3 +79,14 @@ def test_somebody_is_placed_though_the_key_came_early(held: Held) -> None:
     page.keyboard.press("Shift+H")
     release()
     expect(page.get_by_text("Click where")).to_be_visible()
+
+
+def test_a_panel_that_is_not_read_yet_takes_no_click_and_loses_none(held: Held) -> None:
+    page, release = held("?tab=parameters", "**/js/inspector/parameters.js")
+    page.locator(".cam").first.wait_for()
+    changed_only = page.get_by_text("changed only")
+    with pytest.raises(TimeoutError, match="element is inert"):
+        changed_only.click(timeout=1_000)
+    release()
+    changed_only.click()
+    expect(changed_only).to_have_attribute("aria-pressed", "true")

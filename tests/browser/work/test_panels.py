@@ -115,6 +115,9 @@ def test_the_focus_goes_on_to_what_is_left(flat_page: Page, server: Server) -> N
     page.get_by_role("tab", name="Parameters").click()
     panel = page.locator("#panel-parameters")
     panel.get_by_role("button", name="changed only").click()
+    expect(panel.get_by_role("button", name="changed only")).to_have_attribute(
+        "aria-pressed", "true"
+    )
     resets = panel.get_by_role("button", name=re.compile("^Reset (?!all)"))
     expect(resets).to_have_count(2)
     resets.first.focus()
