@@ -259,13 +259,13 @@ def main() -> int:
     # at once for all processes that the tests start
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
-    # these go beside the full form, whose tests leave some of both cores
-    every_third = ("tests.mutate", "--workers", "1", "--every", "3")
-    mutants = Check("mutants", ((*WAITING, PYTHON, "-m", *every_third),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time
+    # beside the full form, whose tests leave some of both cores
     checked = (*WAITING, *fuzzing(0.0, *always, "--bounds", workers=1))
     checked_kernels = Check("kernels that check their indices", (checked,))
-    # these two go side by side with the benchmarks, which keep one core busy
+    # these three go side by side with the benchmarks, which keep one core busy
+    every_fourth = ("tests.mutate", "--workers", "1", "--every", "4")
+    mutants = Check("mutants", ((*WAITING, PYTHON, "-m", *every_fourth),))
     fuzz = Check("fuzz", (fuzzing(1.4, *always, "--imports", workers=1),))
     bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds", workers=1),))
     names = [check.name for check in (*page, *code, kernels, *test_runs([]).values())]
@@ -320,9 +320,9 @@ def main() -> int:
                 PASSED.write_text(before, encoding="utf-8")
         if arguments.all:
             with ThreadPoolExecutor(1) as lane:
-                checking = lane.submit(in_order, [checked_kernels, mutants])
+                checking = lane.submit(in_order, [checked_kernels])
                 failed += [one.name for one in longer_tests if not one.run(shown=True)]
-                timed = lane.submit(in_order, [bounds, fuzz])
+                timed = lane.submit(in_order, [bounds, fuzz, mutants])
                 failed += [] if benchmarks.run(shown=True) else [benchmarks.name]
                 failed += checking.result() + timed.result()
     if failed:

@@ -46,7 +46,7 @@ FormatName = Annotated[
 ]
 
 _RUN = arg(metavar="RUN", help="The run's number or name.")
-_RUNS = arg(metavar="RUN …", help="Their numbers or names.")
+_RUNS = arg(metavar="RUN …", help="Numbers or names of runs.")
 
 
 @dataclass(kw_only=True)
@@ -350,7 +350,7 @@ class Batch(Where):
 
 @dataclass
 class Tune(Where, OfStudies):
-    """Search better values for a recording, and evaluate them again on other seeds."""
+    """Search for better parameter values of a recording, and evaluate them with other seeds."""
 
     recordings: Annotated[
         Positional[tuple[str, ...]],
@@ -359,7 +359,7 @@ class Tune(Where, OfStudies):
     minutes: Annotated[float, limited(float, "a number above 0", 1e-9, 1e4)] = 5.0
     """Duration of the search, minutes."""
     set: SetValues = ()
-    """One value of the reference, which is tried too, and with which the result is compared."""
+    """A value of the reference, with which what is found is compared; it is tried as well."""
     without_truth: FlagCreatePairsOff[bool] = False
     """Do not look at the truth where there is one."""
     save_as: Annotated[str, arg(metavar="NAME")] = "tuned"
@@ -457,7 +457,7 @@ class OfferTemplates:
     """Track a sequence and list the templates that its tracks suggest; with --add, add some.
 
     Boxes of people whom several cameras agree about, in cameras or looks without a template.
-    What is added is written into sequence.toml, and what was there is kept beside it.
+    What is added is written into sequence.toml, and its earlier content is stored beside it.
     """
 
     sequence: SequenceName
@@ -477,7 +477,7 @@ class OfferTemplates:
 
 @dataclass
 class RemoveTemplates:
-    """Remove templates from a sequence's file; a copy of the file before is stored beside it."""
+    """Remove templates from a sequence's file, and store its earlier content beside it."""
 
     sequence: SequenceName
     numbers: Annotated[Positional[tuple[int, ...]], arg(metavar="NUMBER …")]

@@ -100,11 +100,12 @@ class Evaluator:
             is_new = shown is None or _named(shown) != _named(scored)
             is_new = is_new or (shown is not None and shown.tracks is not scored.tracks)
             if is_new and _named(scored) not in self._failed:
-                computing = snapshot.run_state.state == "computing"
-                # these tracks are about to be replaced, by another run or by their smoothed ones
-                if computing and (run.complete or run.key != snapshot.run_state.key):
-                    return None, None
-                over = scored.final or not computing
+                state = snapshot.run_state
+                computing, replaced = state.state == "computing", run.key != state.key
+                if computing and run.complete and not replaced:
+                    return None, None  # its smoothed tracks are about to come
+                # of another run that is about to come the first steps may take long
+                over = not computing or (scored.final and not replaced)
                 if self._newest != (scored.key, over):
                     self._newest, self._newest_since = (scored.key, over), time.monotonic()
                 since = self._newest_since

@@ -38,7 +38,7 @@ slider is dragged or a number is typed, changes from elsewhere do not overwrite 
 - The arrow of a changed row resets it, *Reset all* resets every value and method; *Save as* stores
   all values as a preset.
 - *Effect* above the table runs the recording with a few other values of each of the first twelve
-  listed parameters, in the background, while the workbench is not used otherwise. Each row then
+  listed parameters, in the background, while nothing else is computed. Each row then
   shows the curve of MOTA (without ground truth: of the number of tracks) over the values, and the
   share of the variance of MOTA over all these runs that this parameter alone explains: the
   importance that [studies](studies.md) report, here with one parameter varied at a time.
@@ -57,8 +57,8 @@ slider is dragged or a number is typed, changes from elsewhere do not overwrite 
    to no person, `detection_probability` the share of the visible people who have a box. Estimate
    both by counting boxes in the pictures.
 4. **Then the identities**: the fusion's birth, motion and recognition.
-5. **Last the extraction threshold**, the weight above which a component is reported; a change of it
-   runs no filter again.
+5. **Last the extraction threshold**, the weight above which a component is reported; after a change
+   of it no filter runs again.
 
 Before a change, `Pin as A` stores the shown run as A: the timeline and the Compare tab then show
 both runs.

@@ -23,12 +23,10 @@ from numpy import ndarray
 
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.files.atomic import file_names
+from tracker.io.read.detections.motchallenge import GROUND_PLANE, TRACKEVAL
 
 BENCHMARK, SPLIT, TRACKER = "multiview", "train", "multiview-phd"
 """The names of the benchmark, of its part and of the tracker in TrackEval's folders."""
-
-GROUND = "ground-plane"
-"""The name of the ground plane in the place of a camera's."""
 
 PERSON, DISTRACTOR = 1, 8
 """The class numbers of the challenge for people, and for people whose position is uncertain."""
@@ -46,7 +44,7 @@ def write(folder: Path, run: ExportedRun, options: Options) -> None:
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in sequence.name)
     half = sequence.target_half_extents
     truth = sequence.ground_truth
-    names = file_names([GROUND, *(camera.name for camera in sequence.cameras)])
+    names = file_names([GROUND_PLANE, *(camera.name for camera in sequence.cameras)])
     parts = [(part, k - 1) for k, part in enumerate(names)]
     for done, (part, index) in enumerate(parts):
         options.at(done, len(parts))
@@ -58,11 +56,11 @@ def write(folder: Path, run: ExportedRun, options: Options) -> None:
             boxes = boxes + _FROM_1
         last = _numbers(tracks.positions[:, 2].tolist()) if index < 0 else ["-1"] * len(tracks)
         rows = _rows(tracks.frames, tracks.ids, boxes, np.minimum(tracks.existences, 1.0), last)
-        results = folder / "trackers" / "mot_challenge" / f"{BENCHMARK}-{SPLIT}" / TRACKER / "data"
+        results = folder / "trackers" / TRACKEVAL / f"{BENCHMARK}-{SPLIT}" / TRACKER / "data"
         _save(results / f"{one}.txt", _chosen(rows, visible))
         if truth is None:
             continue
-        home = folder / "gt" / "mot_challenge" / f"{BENCHMARK}-{SPLIT}" / one
+        home = folder / "gt" / TRACKEVAL / f"{BENCHMARK}-{SPLIT}" / one
         if index < 0:
             boxes, visible = _outlines(truth.positions, half), np.ones(len(truth.ids), dtype=bool)
         else:
@@ -87,7 +85,7 @@ def write(folder: Path, run: ExportedRun, options: Options) -> None:
             ],
         )
     if truth is not None:
-        maps = folder / "gt" / "mot_challenge" / "seqmaps" / f"{BENCHMARK}-{SPLIT}.txt"
+        maps = folder / "gt" / TRACKEVAL / "seqmaps" / f"{BENCHMARK}-{SPLIT}.txt"
         _save(maps, ["name\n", *(f"{name}-{part}\n" for part, _ in parts)])
     options.at(len(parts), len(parts))
 

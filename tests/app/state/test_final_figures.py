@@ -146,3 +146,19 @@ def test_a_run_that_was_stopped_while_it_was_smoothed_is_not_settled(bench: Work
     assert run.complete
     bench.scored(scored(run, FRAMES))
     assert not is_settled(bench.snapshot())
+
+
+def test_a_finished_run_has_its_figures_while_the_next_one_has_no_step_yet(
+    bench: Workbench,
+) -> None:
+    now, key = bench.snapshot(), begun(bench)
+    assert now.sequence is not None
+    pipeline.compute(now.sequence, now.parameters, on_progress=bench.run_progresses)
+    bench.run_ends(key, "done")
+    bench.run_begins("of other parameters", "waits for pictures")
+    evaluator = Evaluator(bench)
+    wait_until(lambda: bench.snapshot().scores.shown is not None)
+    evaluator.close()
+    shown = bench.snapshot().scores.shown
+    assert shown is not None
+    assert (shown.key, shown.steps, shown.final) == (key, FRAMES, True)

@@ -51,7 +51,7 @@ table *better* means that the claim holds or is exceeded, and *worse* that it is
   ([`methods`](#methods)).
 - A person who is more than half hidden in all cameras is often not tracked ([`fig2`](#fig2),
   [`fig3`](#fig3)).
-- Answers to the review queue correct a part of the identity errors only
+- Answers to the review queue correct only part of the identity errors
   ([`corrections`](#corrections)).
 - Most recordings here have few people and last for a minute or less. `wildtrack-points-300` is the
   one crowd. In the two recordings whose names contain `points` the boxes are not those of a

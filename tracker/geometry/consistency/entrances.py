@@ -38,9 +38,8 @@ _LEAST_SIGMA = np.array([0.3, 0.3, 0.15])
 and the height is that of a person's centre, standing or bent. Which entrances are found does not
 depend on them."""
 
-_PRIOR = (
-    3.0  # weight of the prior deviations, in ends of tracks: fewer do not determine a deviation
-)
+_PRIOR = 3.0
+"""Weight of the prior deviations, in ends of tracks: fewer do not determine a deviation."""
 
 MOST = 12
 """Largest number of entrances that are suggested: a list that can be looked through. At most 6 were

@@ -37,10 +37,11 @@ SEQUENCE = "seqinfo.ini"
 """The description that lies beside the folders ``gt`` and ``det`` of the challenge's sequences."""
 
 TRACKEVAL = "mot_challenge"
-"""The folder of the challenge's sequences and results in those of TrackEval."""
+"""The folder of the challenge's sequences and results in TrackEval's folders; below it are a folder
+of the benchmark, one of the sequence or tracker, ``gt`` or ``data``, and the file."""
 
-GROUND_PLANE = "-ground-plane"
-"""The end of the name of a sequence whose boxes are outlines on the floor in metres, as this
+GROUND_PLANE = "ground-plane"
+"""The last words of the name of a sequence whose boxes are outlines on the floor in metres, as this
 program exports them; the last column of its tracks is z."""
 
 _MOST_LABELS = 2**16  # bytes
@@ -72,7 +73,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     # the ninth number of the ground truth is how much of a person is seen; -1 is of a tracker's
     is_truth &= columns < 9 or bool((table[:, 8] >= 0.0).all())
     name = file.path.parent.parent.name if is_truth else file.path.stem
-    if name.endswith(GROUND_PLANE) and (is_truth or columns == 10):
+    if name.endswith(f"-{GROUND_PLANE}") and (is_truth or columns == 10):
         middles = boxes[:, :2] + boxes[:, 2:] / 2.0
         heights = np.full(len(middles), np.nan) if is_truth else table[:, 9]
         yield TruthPiece(
@@ -113,7 +114,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     challenge = file.path.parent.parent / SEQUENCE
     if challenge.is_file():
         file.companions.append(challenge)
-    if placed.any() or challenge.is_file() or TRACKEVAL in file.path.parts:
+    if placed.any() or challenge.is_file() or file.path.parts[-5:-4] == (TRACKEVAL,):
         boxes = boxes - [1.0, 1.0, 0.0, 0.0]
     yield DetectionPiece(
         source=file.path,
