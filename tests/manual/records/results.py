@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.manual.places import RECORDS, ROOT, between
-from tests.manual.records import machines, recordings
+from tests.manual.records import machines, recordings, speed
 from tests.papers.registry import EXPERIMENTS
 
 FOLDER = RECORDS / "experiments"
@@ -111,7 +111,7 @@ def page() -> str:
             parts += [SMALLER.format(**document), ""]
         parts += [_table(document["table"]), ""]
         parts += [f"{note}\n" for note in document["notes"]]
-    parts += [recordings.section(), machines.section()]
+    parts += [recordings.section(), speed.section(), machines.section()]
     return "\n".join(parts).rstrip() + "\n"
 
 
