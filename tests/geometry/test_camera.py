@@ -23,6 +23,7 @@ from tracker.geometry.calibration import (
     LARGEST_SIDE,
     LEAST_FOCAL,
     check_focal_lengths,
+    checked_intrinsics,
     checked_size,
 )
 from tracker.geometry.camera import NEAREST_DEPTH, Camera, stacked
@@ -362,3 +363,15 @@ def test_a_matrix_k_has_plausible_focal_lengths_and_nothing_larger(
     else:
         with pytest.raises(ValueError, match="expected focal lengths fx and fy from"):
             check_focal_lengths(matrix)
+
+
+@pytest.mark.parametrize(("row", "column"), [(1, 0), (2, 0), (2, 1), (2, 2)])
+def test_a_matrix_k_is_upper_triangular_and_ends_with_one(row: int, column: int) -> None:
+    matrix = np.array([[700.0, 0.5, 320.0], [0.0, 710.0, 240.0], [0.0, 0.0, 1.0]])
+    assert_array_equal(checked_intrinsics(matrix), matrix)
+    off = matrix.copy()
+    off[row, column] += 0.25
+    assert_array_equal(checked_intrinsics(off, rounding=0.25), matrix)
+    for rounding in (0.0, 0.2):
+        with pytest.raises(ValueError, match=r"expected \[\[fx, s, cx\]"):
+            checked_intrinsics(off, rounding=rounding)

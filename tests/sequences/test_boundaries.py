@@ -128,8 +128,8 @@ def test_times_of_frames_follow_the_table() -> None:
     assert stamped is not None
     assert stamped.frame_of_step.tolist() == [-1, -1, 1, -1, 2, -1]
     assert stamped.step_of_frame.tolist() == [-1, 2, 4]
-    assert Timing(2, 5.0, 0.2).seconds(12, 10.0) == pytest.approx(2.2)
-    assert Timing(2, None, 0.2).seconds(12, 10.0) == pytest.approx(1.2)
+    assert Timing(2, 5.0, 0.2).seconds(12, 10.0, 0.0) == pytest.approx(2.2)
+    assert Timing(2, None, 0.2).seconds(12, 10.0, 0.0) == pytest.approx(1.2)
     own = Timing(1, None, 0.1, (40.0, 40.1, 40.3))
     assert own.seconds(2, 10.0, 40.0) == pytest.approx(0.3)
     assert own.seconds(9, 10.0, 40.0) == pytest.approx(0.5)

@@ -57,7 +57,7 @@ def checked_intrinsics(
             f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
         )
     found = matrix.copy()
-    found[[1, 2, 2], [0, 0, 1]] = 0.0
+    found[1, 0], found[2] = 0.0, (0.0, 0.0, 1.0)
     return found
 
 

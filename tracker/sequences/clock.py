@@ -115,7 +115,7 @@ class Timing:
             times = (np.arange(count) - self.first_frame) / own
         return Clock.of_times(times + self.time_offset, fps, steps)
 
-    def seconds(self, frames: int, fps: float, beginning: float = 0.0) -> float:
+    def seconds(self, frames: int, fps: float, beginning: float) -> float:
         """Return the time from step 0 to the end of a file, seconds.
 
         Args:
