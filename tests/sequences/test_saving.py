@@ -192,6 +192,14 @@ def test_a_save_keeps_what_was_there_and_reads_back(folder: Path) -> None:
     assert sorted(p.name for p in folder.iterdir() if p.name.startswith(".")) == []
 
 
+def test_a_backup_is_not_written_through_a_link(folder: Path) -> None:
+    outside = folder.parent / "outside"
+    (folder / "sequence.toml.bak").symlink_to(outside)
+    opened = read_sequence(folder)
+    assert saving.save(taught(opened, add), opened).name == "sequence.toml.bak2"
+    assert not outside.exists()
+
+
 def test_at_no_line_of_a_save_is_a_file_there_that_is_not_whole(folder: Path) -> None:
     """A process may be killed between any two lines."""
     before = (folder / FILE).read_bytes()

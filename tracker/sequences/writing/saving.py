@@ -171,7 +171,7 @@ def _copy(path: Path, place: Path, *, link: bool) -> None:
 def _keep(folder: Path, data: bytes) -> Path:
     """Write a backup beside the file, under a name that does not exist yet."""
     path, number = folder / BACKUP, 1
-    while path.exists():
+    while os.path.lexists(path):  # what a link names is not ours to write
         number += 1
         path = folder / f"{BACKUP}{number}"
     write_whole(path, data)  # a half-written backup would be taken for a whole one
