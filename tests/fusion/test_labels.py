@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tests.fusion.rooms import NO_BOXES, empty_room, exact, filtered
+from tests.fusion.rooms import NO_BOXES, Step, empty_room, exact, filtered
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.memory import Memory, recall
 from tracker.fusion.model import FusionModel
@@ -270,3 +270,32 @@ def test_recognition_gives_the_label_back_at_another_place_and_can_be_switched_o
         for step in (19, -1)
     ]
     assert (labels[0] == labels[1]) is recognition
+
+
+@pytest.mark.parametrize("recognition", [True, False])
+def test_a_box_between_two_tracks_is_the_one_s_whose_colours_it_has(recognition: bool) -> None:
+    """One camera shows one of two people, half way between them."""
+
+    def coloured(views: Step, likenesses: list[list[float]]) -> Step:
+        return tuple(replace(view, likenesses=np.array(likenesses)) for view in views)
+
+    both = coloured(exact([[-0.4, 0.0, 0.85], [0.4, 0.0, 0.85]]), [[0.9, 0.1], [0.1, 0.9]])
+
+    def shares(likeness: list[float]) -> ndarray:
+        """The association probabilities of the two people and the box."""
+        middle = coloured(exact([[0.0, 0.0, 0.85]])[:1], [likeness])
+        views = [both] * 20 + [middle + (NO_BOXES,) * 3]
+        results = filtered(MultiBernoulli, views, recognition=recognition, measurement_sigma=20.0)
+        result = results[-1]
+        found = np.zeros(2)
+        person = (result.posterior.means[result.associations.components, 0] > 0.0).astype(int)
+        np.add.at(found, person, result.associations.probabilities)
+        return found
+
+    first, second = shares([0.9, 0.1]), shares([0.1, 0.9])
+    if recognition:
+        own, other = np.array([first[0], second[1]]), np.array([second[0], first[1]])
+        assert (own / (1.0 - own) > 2.0 * other / (1.0 - other)).all()
+        assert (other > 0.0).all()
+    else:
+        np.testing.assert_array_equal(first, second)

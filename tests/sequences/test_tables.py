@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy import ndarray
 
 from tests.synthetic import write_sequence
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.tables import regular_gap
 
@@ -57,3 +59,22 @@ def test_vectors_have_the_order_of_the_table_and_the_length_one(tmp_path: Path) 
     np.save(folder / "cam1.npy", np.concatenate([values, values[:1], values[:0]])[:, :5])
     np.save(folder / "cam2.npy", values[:, :5])
     assert read_sequence(folder).digest != key
+
+
+def test_vectors_are_read_block_after_block(tmp_path: Path) -> None:
+    """A file with more rows than are read at once: each block is divided by its own lengths, and
+    what is wrong is counted from the first row of the file."""
+    rows = 4096 + FRAMES
+    values = np.random.default_rng(1).normal(size=(rows, 2)).astype(np.float32)
+    folder = folder_with(tmp_path / "room", values)
+    boxes = [f"{row * FRAMES // rows},10,20,30,40,0.9" for row in range(rows)]
+    lines = ["frame,left,top,width,height,score", *boxes]
+    (folder / "cam1.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    own = read_sequence(folder).views[0].detections
+    assert own is not None
+    expected = values / np.linalg.norm(values, axis=1, keepdims=True)
+    np.testing.assert_allclose(own.embeddings, expected, atol=1e-3)
+    values[-1, 1] = np.nan
+    np.save(folder / "cam1.npy", values)
+    with pytest.raises(SequenceError, match=r"in row 4103 \(counted from 0\)"):
+        read_sequence(folder)

@@ -184,6 +184,19 @@ def test_nothing_is_learnt_from_few_parts_or_parts_that_do_not_differ() -> None:
     assert learn(400, 40, 0.0) is None  # less than what the correlation of boxes explains
 
 
+@pytest.mark.parametrize(("persons", "dimensions"), [(5, 4), (9, 8), (40, 12)])
+def test_people_differ_in_fewer_dimensions_than_there_are_people(
+    persons: int, dimensions: int
+) -> None:
+    """They differ equally in twelve dimensions."""
+    rng = np.random.default_rng(9)
+    parts = np.repeat(np.arange(persons), 20)
+    vectors = 9.0 * rng.normal(size=(persons, 12))[parts] + rng.normal(size=(len(parts), 12))
+    learnt = learn_covariances(vectors, np.ones(len(parts)), parts)
+    assert learnt is not None
+    assert learnt[0].shape == (12, dimensions)
+
+
 # ── the whole, on tracklets side by side
 
 

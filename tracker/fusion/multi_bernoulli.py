@@ -127,10 +127,8 @@ class MultiBernoulli:
     ) -> tuple[MultiBernoulliState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before = self._parameters, state.tracks
-        seen = all_boxes(views)
-        if p.recognition:
-            alike = reidentification.appearance_ratios(state.identities, before.labels, views)
-            seen = seen._replace(resemblance=alike)
+        alike = reidentification.appearance_ratios(state.identities, before.labels, views)
+        seen = all_boxes(views)._replace(resemblance=alike)
         cameras = missing_frames.cameras_with_frame(views)
         step_model, calibrations = self._with_frame(cameras)
         found = step_kernels.predict_and_update(
