@@ -264,7 +264,8 @@ def main() -> int:
     checked = (*WAITING, *fuzzing(0.0, *always, "--bounds", workers=1))
     checked_kernels = Check("kernels that check their indices", (checked,))
     # these three go side by side with the benchmarks, which keep one core busy
-    every_third = ("tests.mutate", "--workers", "1", "--every", "3")
+    third = str(int(digest()[:8], 16))  # another one with every change of a file
+    every_third = ("tests.mutate", "--workers", "1", "--every", "3", "--seed", third)
     mutants = Check("mutants", ((*WAITING, PYTHON, "-m", *every_third),))
     fuzz = Check("fuzz", (fuzzing(1.4, *always, "--imports", workers=1),))
     bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds", workers=1),))

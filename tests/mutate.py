@@ -504,7 +504,7 @@ def main() -> int:
     )
     parser.add_argument("--every", type=int, default=1, help="only one of so many of the list")
     parser.add_argument("--sample", type=int, default=0, help="draw so many changes")
-    parser.add_argument("--seed", type=int, default=0, help="of the draw")
+    parser.add_argument("--seed", type=int, default=0, help="of the draw, or the first of --every")
     parser.add_argument("--workers", type=int, default=min(4, os.cpu_count() or 1))
     arguments = parser.parse_args()
     words, begin = arguments.words, time.monotonic()
@@ -517,7 +517,7 @@ def main() -> int:
                 mutant
                 for mutant in read()
                 if not mutant.equivalent and any(word in str(mutant) for word in words or [""])
-            ][:: arguments.every]
+            ][arguments.seed % arguments.every :: arguments.every]
         if not mutants:
             parser.error(f"{' '.join(words)}: no change of {LIST.name} holds this")
         survivors = try_all(mutants, max(1, min(arguments.workers, len(mutants))))

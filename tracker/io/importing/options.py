@@ -33,7 +33,7 @@ class CommonImportOptions(BaseModel):
     up: Up | None = None
     """Axis of the calibration's world that points up."""
     pose: Direction | None = None
-    """Direction of R and t."""
+    """What R and t map: points of the world to the camera, or points of the camera to the world."""
     axes: Axes | None = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
     turns: Annotated[str, Field(max_length=40)] | None = None
