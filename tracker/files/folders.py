@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-import sys
 import tempfile
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 import platformdirs
@@ -43,13 +43,24 @@ def _instead() -> Path:
     return Path(tempfile.mkdtemp(prefix="multiview-phd-"))
 
 
-def data_folder() -> Path:
-    """Return the platform's folder for user data."""
+def _stated(variable: str) -> Path | None:
+    """The folder or file that a variable of the environment names."""
+    own = os.environ.get(variable)
+    return Path(own).expanduser().absolute() if own else None
+
+
+def _usual(place: Callable[..., Path], otherwise: str) -> Path:
+    """One of the platform's folders of this program, or a folder of home where there is none."""
     try:
-        found = platformdirs.user_data_path("multiview-phd", appauthor=False)
+        found = place("multiview-phd", appauthor=False)
     except RuntimeError:  # there is no home
         found = Path("~")
-    return found if found.is_absolute() else home() / "multiview-phd"
+    return found if found.is_absolute() else home() / otherwise
+
+
+def data_folder() -> Path:
+    """Return the platform's folder for user data."""
+    return _usual(platformdirs.user_data_path, "multiview-phd")
 
 
 def cache_folder() -> Path:
@@ -58,17 +69,8 @@ def cache_folder() -> Path:
     Rendered recordings, results of finished stages and compiled kernels each have a folder in it.
     All of it can be computed again and may be deleted at any time.
     """
-    own = os.environ.get("MULTIVIEW_PHD_CACHE")
-    if own:
-        return Path(own).expanduser().absolute()
-    if sys.platform == "darwin":
-        base = home() / "Library" / "Caches"
-    elif sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or home() / "AppData" / "Local")
-    else:
-        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        base = given if given.is_absolute() else home() / ".cache"
-    return base / "multiview-phd"
+    usual = _usual(platformdirs.user_cache_path, ".cache/multiview-phd")
+    return _stated("MULTIVIEW_PHD_CACHE") or usual
 
 
 def cache_bytes() -> int:
@@ -94,33 +96,18 @@ def settings_folder() -> Path:
 
     Unlike the caches, the settings cannot be computed again.
     """
-    own = os.environ.get("MULTIVIEW_PHD_SETTINGS")
-    if own:
-        return Path(own).expanduser().absolute()
-    if sys.platform == "darwin":
-        base = home() / "Library" / "Application Support"
-    elif sys.platform == "win32":
-        base = Path(os.environ.get("APPDATA") or home() / "AppData" / "Roaming")
-    else:
-        given = Path(os.environ.get("XDG_CONFIG_HOME", ""))
-        base = given if given.is_absolute() else home() / ".config"
-    return base / "multiview-phd"
+    usual = _usual(partial(platformdirs.user_config_path, roaming=True), ".config/multiview-phd")
+    return _stated("MULTIVIEW_PHD_SETTINGS") or usual
 
 
 def library_file() -> Path:
     """Return ``$MULTIVIEW_PHD_LIBRARY``, else ``library.sqlite3`` in :func:`data_folder`."""
-    own = os.environ.get("MULTIVIEW_PHD_LIBRARY")
-    if own:
-        return Path(own).expanduser().absolute()
-    return data_folder() / "library.sqlite3"
+    return _stated("MULTIVIEW_PHD_LIBRARY") or data_folder() / "library.sqlite3"
 
 
 def detectors_folder() -> Path:
     """Return ``$MULTIVIEW_PHD_DETECTORS``, else ``detectors`` in :func:`data_folder`."""
-    own = os.environ.get("MULTIVIEW_PHD_DETECTORS")
-    if own:
-        return Path(own).expanduser().absolute()
-    return data_folder() / "detectors"
+    return _stated("MULTIVIEW_PHD_DETECTORS") or data_folder() / "detectors"
 
 
 def files_matching(folder: Path, pattern: str) -> list[Path]:
