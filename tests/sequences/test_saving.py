@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -366,6 +367,28 @@ def test_a_copy_is_whole_and_its_own(tmp_path: Path, container: Any) -> None:
     (copied.folder / "cam1.csv").write_text("changed", encoding="utf-8")
     assert {path: path.stat().st_mtime_ns for path in source.rglob("*")} == before
     assert [p.name for p in (tmp_path / "new").iterdir()] == ["mine"]
+
+
+def test_a_copy_has_appearance_and_time_stamps(tmp_path: Path) -> None:
+    source = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
+    stamps = "".join(f"{0.25 * step}\n" for step in range(8))
+    text = (source / FILE).read_text(encoding="utf-8")
+    for camera in ("cam1", "cam2"):
+        np.save(source / f"{camera}.npy", np.eye(8, 3, dtype=np.float32))
+        (source / f"{camera}-times.csv").write_text(f"frame_time\n{stamps}", encoding="utf-8")
+        table = f'detections = "{camera}.csv"'
+        own = f'appearance = "{camera}.npy"\ntimestamps = "{camera}-times.csv"'
+        text = text.replace(table, f"{table}\n{own}")
+    (source / FILE).write_text(text, encoding="utf-8")
+    opened = read_sequence(source)
+    copied = saving.save_copy(taught(opened, widen), opened, tmp_path / "mine")
+    assert copied.digest != opened.digest
+    for view, other in zip(opened.views, copied.views, strict=True):
+        assert view.detections is not None
+        assert other.detections is not None
+        np.testing.assert_array_equal(view.detections.embeddings, other.detections.embeddings)
+    np.save(copied.folder / "cam1.npy", np.zeros((8, 3)))
+    assert np.load(source / "cam1.npy").any()
 
 
 def test_a_copy_is_copied_while_its_pictures_are_read_where_they_were(tmp_path: Path) -> None:

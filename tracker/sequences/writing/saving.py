@@ -37,6 +37,9 @@ from tracker.sequences.writing.teaching import (
 BACKUP = f"{FILE}.bak"
 """The name of the backup of a file; later backups have a number."""
 
+_TABLES = {".csv", ".npy"}
+"""Endings of files that are edited, in contrast to pictures."""
+
 
 def why_not_in_place(folder: Path) -> str | None:
     """Return the reason why a sequence cannot be saved in its folder; None if it can."""
@@ -113,15 +116,17 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
             text = (source / FILE).read_bytes().decode("utf-8-sig")
             text = rewritten(text, saved, sequence, f"{source.name}/{FILE}", name=folder.name)
             # of a copy that was just saved the pictures are still read where they were before
-            for path in _files(read_sequence(source), tomllib.loads(text)):
-                place = building / path.relative_to(source)
+            found = read_sequence(source)
+            for path in {file.path for file in found.files} - {found.folder / FILE}:
+                place = building / path.relative_to(found.folder)
                 place.parent.mkdir(parents=True, exist_ok=True)
                 # a link to a file of the program could be written through
-                _copy(path, place, link=path.suffix.lower() != ".csv" and not built_in)
+                _copy(path, place, link=path.suffix.lower() not in _TABLES and not built_in)
             (building / FILE).write_bytes(text.encode("utf-8"))
             read_sequence(building)
-            for written in (building / FILE, *building.rglob("*.csv")):
-                sync_file(written)
+            for written in building.rglob("*"):
+                if written.name == FILE or written.suffix.lower() in _TABLES:
+                    sync_file(written)
             sync_folder(building)
             os.replace(building, folder)
             sync_folder(folder.parent)
@@ -146,21 +151,7 @@ def _check_place(folder: Path, source: Path) -> None:
         )
 
 
-def _files(sequence: Sequence, values: dict[str, Any]) -> Iterator[Path]:
-    """Yield every file of the sequence apart from its ``sequence.toml``."""
-    for view, camera in zip(sequence.views, values["camera"], strict=True):
-        if view.video is not None:
-            yield view.video
-        yield from (path for path in view.images if path.exists())  # some may be missing
-        if "detections" in camera:
-            yield sequence.folder / camera["detections"]
-    if "ground_truth" in values:
-        yield sequence.folder / values["ground_truth"]["file"]
-
-
 def _copy(path: Path, place: Path, *, link: bool) -> None:
-    if place.exists():  # two cameras may name one file
-        return
     if link:
         with contextlib.suppress(OSError):
             os.link(path.resolve(), place)
