@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -22,6 +23,7 @@ from tracker.files import atomic
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.errors import SequenceError
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE, read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
@@ -356,6 +358,11 @@ def test_a_rendered_room_is_never_altered(folder: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize("container", ["mp4", "images"])
 def test_a_copy_is_whole_and_its_own(tmp_path: Path, container: Any) -> None:
     source = write_sequence(tmp_path / "room", frames=8, detections=True, container=container)
+    with FrameReader(read_sequence(source)) as reader:
+        cv2.imwrite(str(source / "empty.png"), next(iter(reader.iterate(0))))
+    text = (source / FILE).read_text(encoding="utf-8")
+    text = text.replace('name = "cam1"', 'name = "cam1"\nbackground = "empty.png"')
+    (source / FILE).write_text(text, encoding="utf-8")
     opened = read_sequence(source)
     before = {path: path.stat().st_mtime_ns for path in source.rglob("*")}
     copied = saving.save_copy(taught(opened, add, widen), opened, tmp_path / "new" / "mine")
@@ -363,6 +370,7 @@ def test_a_copy_is_whole_and_its_own(tmp_path: Path, container: Any) -> None:
     assert taught_values(copied) == taught_values(taught(opened, add, widen))
     assert copied.ground_truth is not None
     assert copied.has_pictures
+    assert copied.views[0].background == copied.folder / "empty.png"
     assert copied.has_detections
     (copied.folder / "cam1.csv").write_text("changed", encoding="utf-8")
     assert {path: path.stat().st_mtime_ns for path in source.rglob("*")} == before
