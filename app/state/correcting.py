@@ -150,22 +150,34 @@ class Correcting:
             raise CorrectionError("no recording is open")
         if self._log.problem is not None:
             raise CorrectionError(f"{self._log.problem}; mend the file, or move it away")
-        own = own_place(self._recording.folder)
-        path = _written(corrections, (writing_place(self._recording.folder), own))
+        self._write(self._recording, corrections)
+        self._workbench.correct(self._recording, corrections)
+
+    def _write(self, recording: Recording, corrections: Told) -> None:
+        own = own_place(recording.folder)
+        path = _written(corrections, (writing_place(recording.folder), own))
         if self._log.path == own != path:  # the folder has again what was kept in the settings
             with contextlib.suppress(OSError):
                 own.unlink()
         self._log, self._mark = Log(path, corrections), _mark_of(path)
-        self._workbench.correct(self._recording, corrections)
+
+    def _carry(self, recording: Recording) -> None:
+        """Write the log into a copy of the recording, in which the workbench goes on."""
+        try:
+            self._write(recording, self._log.corrections)
+        except CorrectionError as error:
+            words = f"The copy has no corrections: {error}"
+            self._workbench.notify("warn", words, "The recording that was copied has them.")
 
     def _on_change(self, change: Change) -> None:
         recording = self._workbench.snapshot().sequence
         if recording is None or change not in ("sequence", "taught"):
             return
         with self._lock:
-            same = self._recording is not None and self._recording.views is recording.views
-            self._recording = recording
-            if change == "taught" and same:
+            before, self._recording = self._recording, recording
+            if change == "taught" and before is not None and before.views is recording.views:
+                if before.folder != recording.folder and self._log.corrections:
+                    self._carry(recording)
                 return
             self._log = open_log(recording.folder)
             self.skipped = set()

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app.state import correcting
 from app.state.edits import Edits
 from app.state.snapshot import Event
 from app.state.teaching import Drafts, Teaching
@@ -25,6 +26,7 @@ from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import Npm, answering, files, giving, package, pooling, source_of
+from tracker.corrections.log import read_log
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
@@ -329,6 +331,38 @@ def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     assert "template" not in tomllib.loads((walkers.parent / "mine" / FILE).read_text("utf-8"))
     words = complaint(command(client, "copy_taught", folder=str(walkers)))
     assert "expected a new or an empty folder" in words
+
+
+def test_a_copy_has_the_corrections(client: TestClient, walkers: Path) -> None:
+    """They count when the copy is opened again; each recording goes on with its own log."""
+    command(client, "correct", corrections=[{"kind": "checked", "first": 0, "last": 9}])
+    command(client, "copy_taught", folder="mine")
+    copied = walkers.parent / "mine"
+    (first,) = read_log(copied / "corrections.toml")
+    assert (first.first, first.last) == (0, 9)
+    command(client, "correct", corrections=[{"kind": "checked", "first": 20, "last": 29}])
+    assert len(read_log(copied / "corrections.toml")) == 2
+    assert read_log(walkers / "corrections.toml") == (first,)
+    command(client, "undo")
+    assert read_log(copied / "corrections.toml") == (first,)
+
+
+def test_a_copy_whose_corrections_cannot_be_written_says_so(
+    client: TestClient, walkers: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command(client, "correct", corrections=[{"kind": "checked", "first": 0, "last": 9}])
+
+    def full(path: Path, corrections: object) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    said: list[str] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(correcting, "write_log", full)
+        patch.setattr(Workbench, "notify", lambda _, level, words, hint="": said.append(words))
+        command(client, "copy_taught", folder="mine")
+    (words,) = [words for words in said if words.startswith("The copy has no corrections")]
+    assert "No space left on device" in words
+    assert len(read_log(walkers / "corrections.toml")) == 1
 
 
 def test_a_rendered_room_is_offered_as_a_copy(
