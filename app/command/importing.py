@@ -42,6 +42,9 @@ def import_files(command: Import) -> int:
 
     if command.output is not None and (command.output / FILE).exists():
         raise CommandError(f"{command.output}: holds a {FILE} already; name another folder")
+    for folder in command.sources:
+        if (folder / FILE).is_file():
+            say(f"{folder}: has a {FILE}: every command takes it without an import")
     sources = [*command.sources]
     sources += _not_inside((path for _, path in options.cameras), command.sources)
     waited: list[str] = []
