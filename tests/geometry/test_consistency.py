@@ -104,3 +104,17 @@ def test_a_pair_of_boxes_counts_where_no_other_pair_of_either_is_closer() -> Non
     first, second = np.array([0, 0, 1, 2]), np.array([1, 0, 1, 2])
     kept = consensus._one_to_one(first, second, np.array([0.2, 0.1, 0.3, 0.4]))
     assert kept.tolist() == [1, 3]
+
+
+def test_a_depth_is_known_in_front_of_both_cameras_and_by_rays_that_are_not_parallel() -> None:
+    base, there = np.array([2.0, 0.0, 0.0]), np.array([1.0, 3.0, 0.5])
+    meeting, parallel = there / np.linalg.norm(there), np.array([0.0, 1.0, 0.0])
+    back = (there - base) / np.linalg.norm(there - base)
+    one = np.array([meeting, -meeting, meeting, -meeting, parallel])
+    other = np.array([back, back, -back, -back, parallel])
+    middle, along_one, along_other, gaps, ahead = consensus._between(base, one, other)
+    assert ahead.tolist() == [True, False, False, False, False]
+    np.testing.assert_allclose(middle[:4], [there] * 4)
+    np.testing.assert_allclose(np.abs(along_one[:4]), np.linalg.norm(there))
+    np.testing.assert_allclose(np.abs(along_other[:4]), np.linalg.norm(there - base))
+    np.testing.assert_allclose(gaps[:4], 0.0, atol=1e-12)

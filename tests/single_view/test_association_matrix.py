@@ -272,6 +272,15 @@ def test_who_comes_back_near_and_in_his_colours_is_the_same() -> None:
     assert labels_by_place(situation) == [(1,)]
 
 
+@pytest.mark.parametrize(("missing", "steps"), [(0, 1), (2, 3), (9, 4)])
+def test_who_is_interrupted_is_expected_further_on_for_three_steps(
+    missing: int, steps: int
+) -> None:
+    box, velocity = np.array([50.0, 40.0, 5.0, 15.0]), np.array([3.0, -1.0])
+    one = MovingObject((1,), box, 300, velocity, missing)
+    assert one.expected.tolist() == [50.0 + 3.0 * steps, 40.0 - steps]
+
+
 @pytest.mark.parametrize("back", [person(64, BLUE), person(150, RED)], ids=["other", "elsewhere"])
 def test_who_comes_in_other_colours_or_elsewhere_is_new(back: Rectangle) -> None:
     situation, told = play([[person(60, RED)], [], [], [back]])

@@ -246,6 +246,14 @@ def test_nano_det_against_plain_loops(size: tuple[int, int]) -> None:
     assert not found.suppressed
 
 
+def test_nano_det_has_no_stride_of_0() -> None:
+    outputs = nano_det()
+    expected = proposals(outputs, SIZE)
+    outputs["cls_pred_stride_0"] = np.zeros((1, 4, 3), np.float32)
+    outputs["dis_pred_stride_0"] = np.zeros((1, 4, 16), np.float32)
+    np.testing.assert_array_equal(proposals(outputs, SIZE).corners, expected.corners)
+
+
 def test_nano_det_of_another_size_is_refused() -> None:
     with pytest.raises(ValueError, match="stride 8 have 64 and 64 rows; expected 96, one for each"):
         proposals(nano_det(), (96, 64))

@@ -149,6 +149,26 @@ def test_the_best_of_windows_that_overlap_takes_the_others() -> None:
     assert [len(one) for one in nobody] == [0, 0]
 
 
+def test_a_place_is_the_mean_of_the_likely_windows_of_that_person(
+    heads: Sequence, reader: FrameReader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finder = ShapeFinder(heads, 0, reader)
+    windows = finder._windows
+    one, other = 0, int(np.argmax(np.abs(windows.boxes[:, 0] - windows.boxes[0, 0])))
+    scores = np.full(len(windows.boxes), -9.0)
+    owners, _ = strongest(windows.edges, np.where(np.arange(len(scores)) == one, 1.0, 0.0), 0.3)
+    near, far = np.flatnonzero(owners == one)[1:3]
+    # the last is of the same person, and too unlikely to say where that is
+    scores[[one, other, near, far]] = 3.0, 7.0, 2.0, 0.5
+    monkeypatch.setattr(finder, "_trees", SimpleNamespace(scores=lambda *_: scores))
+    picture = reader.picture(0, 0)
+    assert picture is not None
+    _, found = finder.find(finder.start(), picture, 0.5, 0.3)
+    own = np.exp([0.0, -1.0]) @ windows.boxes[[one, near]] / (1.0 + np.exp(-1.0))
+    assert found.log_odds.tolist() == [7.0, 3.0]
+    assert_allclose(found.boxes, [windows.boxes[other], own])
+
+
 def test_a_box_is_supported_by_the_best_window_at_its_place() -> None:
     boxes = np.array([[50, 60, 8, 20], [54, 60, 8, 20], [90, 60, 8, 20]], float)
     edges = np.array([[30, 30, 70, 80], [34, 30, 74, 80], [70, 30, 110, 80]], float)

@@ -85,8 +85,6 @@ def pixels(
         for step in range(comparison.steps):
             here = truth[truth_starts[step] : truth_starts[step + 1]]
             reported = boxes[box_starts[step] : box_starts[step + 1]]
-            if not len(here) or not len(reported):
-                continue
             shared = box_overlaps(here, reported)
             rows, columns = assign(1.0 - shared, 1.0 - overlap)
             first, second = here[rows], reported[columns]
