@@ -206,7 +206,7 @@ class RoomNodes:
         self._entrances = Meshes(server, "/room/entrances", *sphere, opacity=0.05)
         self._rims = Lines(server, "/room/entrance_rims", 1.0)
         self._names = Tags(server, "/labels/entrances", 4, 0.55)
-        self._heights = Tags(server, "/labels/heights", 3, 0.6)
+        self._height = Tags(server, "/labels/height", 1, 0.6)
         cube = geometry.unit_cube()
         self._ground = Meshes(server, "/room/ground", *cube, opacity=1.0)
         # seen from inside alone: the walls behind are faint faces, those in front are their lines
@@ -253,14 +253,9 @@ class RoomNodes:
         if self._walls.visible:
             self._walls.position, self._walls.scale = tuple(middle[0]), tuple(size)
             self._walls.color, self._walls.opacity = palette.line, 0.05
-        corner = np.array([high[0], low[1]])
-        self._heights.show(
-            [
-                Tag((float(corner[0]), float(corner[1]), height + up), f"{up} m")
-                for up in range(int(high[2] - height) + 1)
-                if volume and floor and up < 4
-            ]
-        )
+        top = (float(high[0]), float(low[1]), float(high[2]))
+        # one label: a scale up the edge would lie over who stands before it
+        self._height.show([Tag(top, f"{high[2] - height:g} m")] if volume and floor else [])
         edges = geometry.box_edges((low + high)[None] / 2.0, (high - low) / 2.0)[0]
         self._volume.show(edges if volume else edges[:0], palette.volume)
         entrances = room.entrances if volume and floor else ()

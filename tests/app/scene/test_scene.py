@@ -219,6 +219,9 @@ def test_a_step_is_drawn_as_the_run_has_it(view: View, of: Sequence, run: Run) -
     colours = linear(PALETTES["dark"].of(run.tracks.ids[now]))
     np.testing.assert_array_equal(drawn["/labels/people_discs"].colors[:, 0], colours)
     assert "/labels/entrances_discs" not in view.visible("/labels")
+    height = drawn["/labels/height/00"]
+    assert height.text == "2 m"
+    np.testing.assert_allclose(height.position, (1.5, -1.5, 2.0))
 
 
 def test_layers_and_the_selection_decide_what_is_drawn(view: View) -> None:
