@@ -369,6 +369,13 @@ def test_a_matrix_k_has_plausible_focal_lengths_and_nothing_larger(
 def test_a_matrix_k_is_upper_triangular_and_ends_with_one(row: int, column: int) -> None:
     matrix = np.array([[700.0, 0.5, 320.0], [0.0, 710.0, 240.0], [0.0, 0.0, 1.0]])
     assert_array_equal(checked_intrinsics(matrix), matrix)
+    small = np.diag([0.4, 0.3, 1.0])  # in parts of the picture, as some programs have it
+    assert_array_equal(checked_intrinsics(small), small)
+    for axis in (0, 1):
+        none = small.copy()
+        none[axis, axis] = 0.0
+        with pytest.raises(ValueError, match="expected focal lengths fx and fy above 0"):
+            checked_intrinsics(none)
     off = matrix.copy()
     off[row, column] += 0.25
     assert_array_equal(checked_intrinsics(off, rounding=0.25), matrix)

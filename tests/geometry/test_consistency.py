@@ -96,6 +96,7 @@ def test_log_odds_need_every_part_of_a_recording() -> None:
     assert log_odds(steady, zero) > 7.0 > 1.0 > log_odds(once, zero) > 0.0
     assert log_odds(zero, steady) == -log_odds(steady, zero)
     assert log_odds(steady, steady) == 0.0
+    assert log_odds(zero + 1.0, zero) == 100.0  # each part alike
     assert log_odds(0.01 * steady, zero) == pytest.approx(0.01 * steady.sum())  # never above ΔE
 
 
