@@ -241,7 +241,8 @@ def _named(errors: CameraErrors | None, camera: int) -> bool | None:
 
 def _changes(run: Run, camera: int, rng: np.random.Generator) -> Iterator[tuple[str, Sequence]]:
     """The sequence of a run with one of its cameras changed, in every way."""
-    view, noise = run.sequence.views[camera], run.smoothed and run.smoothed.noise
+    view = run.sequence.views[camera]
+    noise = None if run.smoothed is None else run.smoothed.noise
     if noise is not None and view.detections is not None:
         boxes = view.detections.boxes.copy()
         # with the errors that are there, the variance is nine times theirs
@@ -345,8 +346,8 @@ def _findings(found: Everything) -> tuple[Finding, ...]:
         "heights within 2 σ": {"all": [w for one in every for w in _within(one.heights)]},
     }
     for claim, shares in groups.items():
-        poorest = min(shares, key=lambda name, own=shares: np.mean(own[name]))
-        share, count = float(np.mean(shares[poorest])), len(shares[poorest])
+        share, poorest = min((float(np.mean(own)), name) for name, own in shares.items())
+        count = len(shares[poorest])
         where = "" if poorest == "all" else f", the least of all, on {poorest}"
         verdict: Verdict = "better" if share >= 0.95 else "worse"
         findings.append(Finding(f"95 % of {claim}", f"{share:.3f} of {count}{where}", verdict))
@@ -357,14 +358,14 @@ def _draw(found: Everything) -> Figure:
     from tests.papers.laboratory import drawing
 
     figure = drawing.sheet(11.0, 3.6, "What a run states of its own errors")
-    plots = drawing.panels(figure, [["recording", "walkers"]])
-    for k, (name, plot) in enumerate(plots.items()):
-        named = [_by_change(found, kind, c) for kind in found if kind == name for c in CHANGES]
+    shown: tuple[Kind, ...] = ("recording", "walkers")
+    plots = drawing.panels(figure, [list(shown)])
+    for k, kind in enumerate(shown):
+        named = [_by_change(found, kind, change) for change in CHANGES]
         shares = [one.count(True) / len(one) if one else None for one in named]
         tones = [drawing.colour(k)] * len(CHANGES)
-        shown = shares or [None] * len(CHANGES)
-        drawing.bars(plot, list(CHANGES), shown, tones, named=not k)
-        plot.set_title(f"{NAMES[name]}: share of changed cameras that are named")
+        drawing.bars(plots[kind], list(CHANGES), shares, tones, named=not k)
+        plots[kind].set_title(f"{NAMES[kind]}: share of changed cameras that are named")
     return figure
 
 
