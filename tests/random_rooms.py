@@ -105,6 +105,7 @@ def random_room(
     steps: int = 240,
     late: tuple[float, ...] = (),
     height: float = 1.7,
+    noise: float = 0.03,
 ) -> Sequence:
     """A room of 4 to 10 m with cameras around it and people who walk in it.
 
@@ -116,6 +117,7 @@ def random_room(
         steps: Their number.
         late: Seconds by which each camera shows what happened before; 0 for the others.
         height: Of people, metres.
+        noise: Standard deviation of the edges of boxes, box heights.
     """
     rng = np.random.default_rng(seed)
     sides = rng.uniform(4.0, 10.0, 2)
@@ -140,7 +142,8 @@ def random_room(
         delay = late[number] if number < len(late) else 0.0
         frames, boxes = [], []
         for step in range(steps):
-            found = boxes_of(rng, camera, walkers.at(step / fps - delay), walkers.heights)
+            at = walkers.at(step / fps - delay)
+            found = boxes_of(rng, camera, at, walkers.heights, noise=noise)
             frames += [step] * len(found)
             boxes.append(found)
         detections = Detections(
@@ -162,7 +165,7 @@ def random_room(
             truth,
             np.ones(steps * people, dtype=bool),
         ),
-        digest=f"random-{seed}-{fps}-{steps}",
+        digest=f"random-{seed}-{fps}-{steps}-{noise}",
     )
 
 

@@ -13,6 +13,7 @@ from tests.papers.claims import (
     jpda,
     methods,
     ppf,
+    uncertainty,
 )
 from tests.papers.laboratory import sequences
 from tests.papers.laboratory.experiment import Experiment
@@ -33,6 +34,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         association.EXPERIMENT,
         methods.EXPERIMENT,
         rooms.EXPERIMENT,
+        uncertainty.EXPERIMENT,
     )
 }
 """By name, in the order in which ``--all`` runs them."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.conftest import DATA
@@ -14,6 +15,7 @@ from tests.papers.claims import association, jpda, ppf
 from tests.papers.claims.cmc import GATES
 from tests.papers.claims.cmc import methods as cmc_methods
 from tests.papers.claims.methods import ON_PICTURES
+from tests.papers.claims.uncertainty import NOISIER, QUICK_ROOMS, UNCHANGED
 from tests.papers.clips.light import ROBUST
 from tests.papers.laboratory.experiment import Context
 from tests.papers.laboratory.writing import write
@@ -105,6 +107,19 @@ def rooms(found: dict[str, Any]) -> None:
     assert all(case["rooms"] for case in found["numbers"]["cases"].values())
 
 
+def uncertainty(found: dict[str, Any]) -> None:
+    walkers = found["numbers"]["walkers"].values()
+    assert len(walkers) == QUICK_ROOMS
+    assert 0.9 < np.mean([inside for one in walkers for inside in one["inside"]]) < 0.99
+    for one in walkers:
+        assert one["named"][UNCHANGED] == [None]
+        assert one["named"]["turned up or down by 3°"] == [True]
+        assert one["named"]["turned sideways by 3°"] == [True]
+        assert max(abs(error) for error, _ in one["late"]) < 0.03
+        assert max(abs(error) for error, _ in one["heights"]) < 0.02
+    assert any(one["named"][NOISIER] == [True] for one in walkers)
+
+
 LOOKS: dict[str, Callable[[dict[str, Any]], None]] = {
     "fig1": fig1,
     "fig2": fig2,
@@ -118,6 +133,7 @@ LOOKS: dict[str, Callable[[dict[str, Any]], None]] = {
     "association": merging_and_splitting,
     "methods": methods,
     "rooms": rooms,
+    "uncertainty": uncertainty,
 }
 """What must be seen in the numbers of each."""
 

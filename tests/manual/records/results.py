@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.stats import spearmanr
 
 from tests.manual.places import RECORDS, ROOT, between
 from tests.manual.records import machines, recordings, speed
 from tests.papers.registry import EXPERIMENTS
+from tracker.review.self_consistency.estimate import FILE as WITHOUT_TRUTH
 
 FOLDER = RECORDS / "experiments"
 KEPT = ("experiment", "version", "form", "claim", "findings", "table", "notes")
@@ -58,6 +66,18 @@ table *better* means that the claim holds or is exceeded, and *worse* that it is
   detector: they are made from hand-marked points and boxes, with simulated noise, misses and
   clutter, so tracks are more accurate there than with a detector.
 """
+
+IDENTITY = """## Identity without truth
+
+Each recording was tracked with random settings; of each the estimate J without ground truth
+([Methods](methods.md#identity-without-truth)) is compared with the true IDF1. The correlation is
+Spearman's, over the settings of one recording. The program takes the interval beside J from the
+same record, which is older than the others of this page: the present program tracks the same
+recordings somewhat differently. `python3 -m tests.benchmarks.engine.without_truth` makes it.
+"""
+
+BOUNDS = (0.0, 0.5, 0.8, 0.95, math.inf)
+"""Bounds of J between which the mean error is stated."""
 
 
 def record(names: list[str], data: Path) -> None:
@@ -111,8 +131,31 @@ def page() -> str:
             parts += [SMALLER.format(**document), ""]
         parts += [_table(document["table"]), ""]
         parts += [f"{note}\n" for note in document["notes"]]
-    parts += [recordings.section(), speed.section(), machines.section()]
+    parts += [_without_truth(), recordings.section(), speed.section(), machines.section()]
     return "\n".join(parts).rstrip() + "\n"
+
+
+def _without_truth() -> str:
+    """The part on identity without truth, from the record by which the program calibrates J."""
+    kept = json.loads(WITHOUT_TRUTH.read_text(encoding="utf-8"))
+    pairs = {name: np.array(own) for name, own in kept.items()}
+    rows = []
+    for name, own in pairs.items():
+        correlation = f"{spearmanr(own[:, 0], own[:, 1]).statistic:.2f}"
+        rows.append([name, f"{len(own)} settings", correlation, *_errors(own)])
+    every = np.concatenate(list(pairs.values()))
+    for low, high in reversed([*pairwise(BOUNDS)]):
+        own = every[(every[:, 0] >= low) & (every[:, 0] < high)]
+        words = f"J from {low:g}" + (f" to {high:g}" if math.isfinite(high) else "")
+        rows.append([words, f"{len(own)} settings", "", *_errors(own)])
+    head = ["recording", "of", "correlation", "mean of abs(J − IDF1)", "mean of J − IDF1"]
+    return "\n".join([IDENTITY, _table({"head": head, "rows": rows}), ""])
+
+
+def _errors(pairs: Float[ndarray, "n 2"]) -> list[str]:
+    error = pairs[:, 0] - pairs[:, 1]
+    """The mean size of J − IDF1, and its mean."""
+    return [f"{np.abs(error).mean():.2f}", f"{error.mean():+.2f}"]
 
 
 def readme() -> str:
