@@ -153,8 +153,8 @@ def _without_truth() -> str:
 
 
 def _errors(pairs: Float[ndarray, "n 2"]) -> list[str]:
-    error = pairs[:, 0] - pairs[:, 1]
     """The mean size of J − IDF1, and its mean."""
+    error = pairs[:, 0] - pairs[:, 1]
     return [f"{np.abs(error).mean():.2f}", f"{error.mean():+.2f}"]
 
 
