@@ -154,10 +154,9 @@ class _Window:
         estimates = tracks.indices[tracks.at(step)]
         self.truth_life[people] += sign
         self.track_life[estimates] += sign
-        if len(people) and len(estimates):
-            pairs = np.ix_(people, estimates)
-            self.near[pairs] += sign * np.minimum(self.comparison.distances[step], self.cutoff)
-            self.both[pairs] += sign
+        pairs = np.ix_(people, estimates)
+        self.near[pairs] += sign * np.minimum(self.comparison.distances[step], self.cutoff)
+        self.both[pairs] += sign
 
     def distance(self, order: float) -> float:
         """Compute OSPA between the tracks in the window."""
