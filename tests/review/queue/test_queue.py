@@ -112,14 +112,14 @@ def test_a_doubt_is_known_again_by_its_places() -> None:
 
 
 def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
-    one = walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 80)
-    other = walk((0.0, -1.5, 1.0), (0.0, 1.5, 1.0), 80)
+    one = walk((-1.4, -1.4, 1.0), (1.4, 1.4, 1.0), 80)
+    other = walk((1.4, -1.4, 1.0), (-1.4, 1.4, 1.0), 80)
     run = run_of(sequence([(0, one), (0, other)], 80))
     lanes = TrackRows(run.tracks)
     track, third = (int(name) for name in lanes.ids)
-    clear = ClearPlaces(lanes, 1.0 / 25.0, 0.25)
+    clear = ClearPlaces(lanes, 1.0 / 25.0)
     apart = np.linalg.norm((one - other)[:, :2], axis=1)
-    near = np.flatnonzero(apart < 1.0)
+    near = np.flatnonzero(apart < 2.0)
     before, after = clear.before(track, 40), clear.after(track, 40)
     assert abs(before.step - (near[0] - 1)) <= 2
     assert abs(after.step - (near[-1] + 1)) <= 2
@@ -213,10 +213,10 @@ def test_who_goes_on_as_another_is_asked_aside_of_the_moment_itself() -> None:
     run = run_of(sequence([(0, walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 80))], 80))
     lanes = TrackRows(run.tracks)
     track = int(lanes.ids[0])
-    clear = ClearPlaces(lanes, 1.0 / 25.0, 0.25)
+    clear = ClearPlaces(lanes, 1.0 / 25.0)
     assert clear.before(track, 40).step == 30
     assert clear.after(track, 40).step == 50
-    slow = ClearPlaces(lanes, 0.5, 0.25)
+    slow = ClearPlaces(lanes, 0.5)
     assert (slow.before(track, 40).step, slow.after(track, 40).step) == (38, 42)
 
 

@@ -346,13 +346,13 @@ def test_boxes_are_shared_by_as_much_as_the_lesser_has_of_each_over_their_camera
 def test_what_is_asked_of_is_the_nearest_place_where_the_track_stands_clear() -> None:
     """By going through the steps one after another, of four who wander about."""
     rng = np.random.default_rng(3)
-    paths = np.cumsum(rng.normal(0.0, 0.12, (90, 4, 3)) * [1.0, 1.0, 0.0], axis=0)
+    paths = np.cumsum(rng.normal(0.0, 0.3, (90, 4, 3)) * [1.0, 1.0, 0.0], axis=0)
     paths[60:75, 0] = np.nan
     run = scene(paths + np.array([0.0, 0.0, 0.85]))
     seen = rng.random((len(run.tracks), 3)) < 0.4
     run.tracks = tracks = replace(run.tracks, seen=seen)
-    lanes, width = TrackRows(tracks), 0.3
-    clear = ClearPlaces(lanes, 0.1, width)
+    lanes = TrackRows(tracks)
+    clear = ClearPlaces(lanes, 0.1)
 
     def gap(row: int) -> float:
         others = (tracks.frames == tracks.frames[row]) & (np.arange(len(tracks)) != row)
@@ -364,7 +364,7 @@ def test_what_is_asked_of_is_the_nearest_place_where_the_track_stands_clear() ->
         away = {int(r): sign * (int(tracks.frames[r]) - step) for r in lanes.rows[track]}
         own = sorted((r for r, k in away.items() if 0 <= k <= 50), key=lambda r: away[r])
         own = [r for r in own if away[r] >= 4] or own
-        far = [r for r in own if gap(r) >= 4.0 * width]
+        far = [r for r in own if gap(r) >= 2.0]
         found = (clear.after if after else clear.before)(track, step)
         if own:
             assert found == lanes.of_row(far[0] if far else max(own, key=gap)), (track, step)
@@ -377,9 +377,9 @@ def test_a_clear_place_is_looked_for_within_five_seconds(away: int, clear: bool)
     """Two who stand side by side but for one step."""
     paths = standing((0, 120, 0.0, 0.0), (0, 120, 0.3, 0.0), steps=121)
     for at in (60 - away, 60 + away):
-        paths[at, 1, 0] = 2.0
+        paths[at, 1, 0] = 2.1
     lanes = TrackRows(scene(paths).tracks)
-    found = ClearPlaces(lanes, 0.1, 0.3)
+    found = ClearPlaces(lanes, 0.1)
     before, after = found.before(1, 60).step, found.after(1, 60).step
     assert (before, after) == ((60 - away, 60 + away) if clear else (56, 64))
 

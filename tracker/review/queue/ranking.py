@@ -173,8 +173,7 @@ def _identity_items(
     other = None if backwards is None else OtherRun(run.tracks, backwards, step_time)
     if other is not None:
         every += other.moves()
-    width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
-    clear = ClearPlaces(track_rows, step_time, width)
+    clear = ClearPlaces(track_rows, step_time)
     every = [clear.move(move) for move in every]
     if other is not None:
         every = [other.with_evidence(move) for move in every]
