@@ -17,20 +17,25 @@ from tracker.runs.run import Run
 
 _SHORT = 1.0
 """Time constant with which the probability that a track is clutter falls with the track's length,
-seconds."""
+seconds. Halved or doubled, 1 or 8 tracks are asked about instead of 2, and as many mistakes found.
+"""
 
 _LONG = 5.0
-"""Time constant of the part of this probability that is due to few boxes, seconds."""
+"""Time constant of the part of this probability that is due to few boxes, seconds. Halved or
+doubled, 1 or 3 tracks are asked about instead of 2, and as many mistakes found."""
 
 _FORGOTTEN = 5.0
 """Time constant with which the probability that a track follows another person after a gap grows
-with the gap, seconds."""
+with the gap, seconds. Halved or doubled, 19 or 16 gaps are asked about instead of 18, and 79 or 80
+mistakes are found."""
 
 _UNSEEN = 1.0
-"""Longest gap without a box of any camera for which no item is made, seconds."""
+"""Longest gap without a box of any camera for which no item is made, seconds. Halved or doubled, 42
+or 11 gaps are asked about instead of 18, and 75 or 79 mistakes are found."""
 
 _FASTEST = 3.0
-"""Speed above which a track may jump to another person, metres per second."""
+"""Speed above which a track may jump to another person, metres per second. Halved, 225 jumps are
+asked about instead of 11, and 68 mistakes are found; doubled 1 jump, and 80 mistakes."""
 
 
 def items(run: Run, track_rows: TrackRows) -> Iterator[ReviewItem]:
