@@ -44,9 +44,6 @@ _LASTS = 1.0
 """Least time between the first and the last step at which boxes agree on a person, seconds. Halved,
 there are 329 items of which 247 are right; doubled 228, of which 156 are."""
 
-_SHARE = 0.5
-"""Least share of the steps between the first and the last one at which boxes agree."""
-
 
 @dataclass(frozen=True, slots=True)
 class Unclaimed:
@@ -213,7 +210,7 @@ def _chains(points: Float[ndarray, "M 6"], step_time: float) -> Iterator[Unclaim
         steps = np.unique(rows[:, 0])
         span = steps[-1] - steps[0] + 1
         share = float(len(steps) / span)
-        if span * step_time < _LASTS or share < _SHARE:
+        if span * step_time < _LASTS:
             continue
         middles = [rows[rows[:, 0] == step, 1:4].mean(axis=0) for step in steps]
         places = tuple(
