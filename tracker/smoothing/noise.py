@@ -29,8 +29,8 @@ from tracker.kernels.smoothing.innovations import (
 )
 from tracker.smoothing.paths import Paths
 
-# These constants change no position: what is measured is the share of positions within the ellipse of
-# 95 % that is reported, 0.926 in the mean of the crowds and of the recordings of
+# These constants change no position: what is measured is the share of positions within the ellipse
+# of 95 % that is reported, 0.926 in the mean of the crowds and of the recordings of
 # ``tests/papers/rooms/fusion_constants.md``.
 MOST_ROWS = 600
 """Number of rows from which the noise is estimated. Halved or doubled, the share in a recording
@@ -58,7 +58,8 @@ _WIDE = 1.0
 doubled it changes no share."""
 
 _DEVIATION, _DEVIATION_VELOCITY = 0.5, 1.0
-"""Prior standard deviation of a window's first state around the smoothed one, m and m/s."""
+"""Prior standard deviation of a window's first state around the smoothed one, m and m/s. Halved or
+doubled, neither changes a share."""
 
 SHARES = 1e-3, 1.0
 """Bounds of r and q, half heights."""
@@ -77,7 +78,7 @@ _START_TIME, _START_PIXELS = 1.0, 1.0
 
 _ITERATIONS, _TOLERANCE = 40, 1e-6
 """Largest number of iterations of L-BFGS, and relative change of the likelihood at which it
-stops."""
+stops. With half and twice as many iterations no share changes by 0.001."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

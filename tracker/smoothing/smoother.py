@@ -93,7 +93,8 @@ changes mean recall by at most 0.0003, mean IDF1 by 0.003, and the error of posi
 
 _NOISE_SHARE = 0.5
 """Least association probability of a box by which the noise is estimated: it is likelier the
-track's than not."""
+track's than not. At 0.25 and 0.75 the mean share of positions within the reported ellipse of 95 %
+changes by 0.004 at most."""
 
 _MEDIAN = 0.4549
 """Median of χ² with one degree of freedom, 0.6745²."""
