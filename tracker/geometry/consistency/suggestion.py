@@ -42,12 +42,13 @@ _TALLEST_STANDING = 2.3
 
 _TRUST = 0.3
 """Weight of the boxes' height against that of :data:`STANDING`, since detectors pad boxes. Halved
-or doubled it changes sizes and the floor by 0.02 m at most."""
+or doubled it changes sizes and the floor by 0.02 m at most, and no figure of tracks in eight random
+rooms and two recordings by 0.001; without it mean IDF1 falls by 0.004, with 1 by 0.017."""
 
 _MARGIN = 0.5
 """Extent of the room beyond the places of people, metres: a first guess, which the user sees and
-corrects. With it 98 % of the true places are in the room; halved 98, doubled 98 and without it 96.
-"""
+corrects. With it 98 % of the true places are in the room, doubled 98 and without it 96; in eight
+random rooms and two recordings recall is 0.027 less without it, and 0.001 more with twice."""
 
 _OUTLIERS = 0.01
 """Share of the places on either side that may be outside the room. Halved it moves a wall
