@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.papers.rooms import fusion_ablations
+from tests.papers.rooms import constants, fusion_ablations
 from tests.papers.rooms.ablations import LEAST
 from tests.papers.rooms.fusion_ablations import (
     FIGURES,
@@ -23,8 +23,10 @@ from tests.papers.rooms.fusion_ablations import (
     values_of,
 )
 from tests.papers.rooms.kept import Rows, read_rows
+from tests.random_rooms import random_room
 from tracker.parameters.catalogue import PARAMETERS, RunParameters
 from tracker.parameters.values import value_of, with_values
+from tracker.smoothing.tracklets import costs, splitting
 
 ROOMS = ["1", "2"]
 GROUPS = groups_of(ROOMS)
@@ -88,3 +90,22 @@ def test_what_was_run_is_not_run_again(tmp_path: Path, monkeypatch: pytest.Monke
     ]
     fill(read_rows(tmp_path), ["7"], [key], 20, tmp_path)
     assert len(asked) == 3
+
+
+def test_a_constant_is_changed_wherever_it_was_imported_and_is_itself_again() -> None:
+    usual = costs.FASTEST
+    with constants.set_to("tracker.smoothing.tracklets.costs.FASTEST", 7.0):
+        assert (costs.FASTEST, splitting.FASTEST) == (7.0, 7.0)
+    assert (costs.FASTEST, splitting.FASTEST) == (usual, usual)
+
+
+def test_what_a_constant_changes_is_printed_for_each_value(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    room = random_room(0, cameras=3, people=2, fps=4.0, steps=30)
+    monkeypatch.setattr(constants, "scenes", lambda: {"crowd 0": (room, 30)})
+    assert constants.main(["tracker.smoothing.smoother.START_SIGMA", "10.0", "0.01"]) == 0
+    same, moved = capsys.readouterr().out.splitlines()
+    assert same.startswith("10.0 in crowds: recall +0.0000 (at most 0.0000), ")
+    assert "millimetres +0.0000 (" in same
+    assert "millimetres +0.0000 (" not in moved

@@ -30,12 +30,14 @@ from tracker.smoothing.noise import COMMON, NoiseModel
 from tracker.smoothing.paths import Paths
 
 MOST_ROWS = 2000
-"""Number of rows from which the shape is estimated."""
+"""Number of rows from which the shape is estimated. Halved, it changes the mean share of positions
+within the reported ellipse of 95 % by 0.003; doubled, nothing."""
 
 _LEVEL_SIGMA = 0.3
 """Prior standard deviation of ω: from the hips to the shoulders of an upright adult, which are at
 0.53 and 0.82 of the height (Drillis, Contini, "Body segment parameters", 1966), it is 0.06 to
-0.64, and a carried load or spread legs are lower."""
+0.64, and a carried load or spread legs are lower. Halved or doubled, it changes that share by
+0.0002 at most."""
 
 _LEAST = 1e-3
 """Least standard deviation of an edge, half heights."""

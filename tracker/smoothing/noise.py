@@ -29,11 +29,15 @@ from tracker.kernels.smoothing.innovations import (
 )
 from tracker.smoothing.paths import Paths
 
+# These constants change no position: what is measured is the share of positions within the ellipse
+# of 95 % that is reported, 0.926 in the mean of the crowds and of the recordings of
+# ``tests/papers/rooms/fusion_constants.md``.
 MOST_ROWS = 600
-"""Number of rows from which the noise is estimated."""
+"""Number of rows from which the noise is estimated. Halved or doubled, the share in a recording
+changes by at most 0.03 or 0.05, in its mean by less than 0.02."""
 
 WINDOW = 60
-"""Most rows of one window."""
+"""Most rows of one window. Halved or doubled, the mean share changes by at most 0.012."""
 
 LEAST_ROWS = 50
 """Number of rows that two cameras see below which nothing is estimated."""
@@ -42,16 +46,20 @@ COMMON = 1.5
 """κ: variance of the error that all cameras have in common, in that of one camera's persistent
 errors and offset: a calibration that is wrong alike in all cameras leaves no trace in their
 residuals, only its order of size can be inferred from what cameras differ by. The value is a
-correlation of 0.6 between the persistent errors of two cameras."""
+correlation of 0.6 between the persistent errors of two cameras. Halved, the share in recordings
+falls by 0.05, doubled it rises by 0.03; in crowds it changes by less than 0.01."""
 
 _FARTHEST = 8.0
-"""Bound of the persistent errors' part of a covariance, in the variance of one camera's."""
+"""Bound of the persistent errors' part of a covariance, in the variance of one camera's. Halved or
+doubled it changes the mean share by 0.002 at most, and without it the share rises by 0.01."""
 
 _WIDE = 1.0
-"""Prior standard deviation of a position where the boxes of a step tell nothing, metres."""
+"""Prior standard deviation of a position where the boxes of a step tell nothing, metres. Halved or
+doubled it changes no share."""
 
 _DEVIATION, _DEVIATION_VELOCITY = 0.5, 1.0
-"""Prior standard deviation of a window's first state around the smoothed one, m and m/s."""
+"""Prior standard deviation of a window's first state around the smoothed one, m and m/s. Halved or
+doubled, neither changes a share."""
 
 SHARES = 1e-3, 1.0
 """Bounds of r and q, half heights."""
@@ -70,7 +78,7 @@ _START_TIME, _START_PIXELS = 1.0, 1.0
 
 _ITERATIONS, _TOLERANCE = 40, 1e-6
 """Largest number of iterations of L-BFGS, and relative change of the likelihood at which it
-stops."""
+stops. With half and twice as many iterations no share changes by 0.001."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

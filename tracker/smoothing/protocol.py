@@ -200,7 +200,8 @@ class NoSmoothing:
 
 
 _FAINT = 0.05
-"""Weight below which a component belongs to no track."""
+"""Weight below which a component belongs to no track. From 0.02 to 0.2 nothing changes in random
+crowds and recordings."""
 
 
 def tracks_of(

@@ -71,8 +71,10 @@ from tracker.steps import Steps
 
 _T = TypeVar("_T")
 
+# The sensitivities below are those of ``tests/papers/rooms/fusion_constants.md``.
 START_SIGMA = 10.0
-"""Prior standard deviation of a path's first position along each axis, metres."""
+"""Prior standard deviation of a path's first position along each axis, metres. Halved or doubled,
+it changes mean recall by at most 0.001, mean IDF1 by 0.002 and the error of positions by 2 mm."""
 
 _AT_ONCE = 1024
 """Number of rows, steps or boxes whose expected boxes are in memory at a time, per thread: with
@@ -82,27 +84,34 @@ _MOST_THREADS = 4
 """Largest number of threads, each of one camera or one block of rows."""
 
 _LEAST_SHARE = 0.01
-"""Association probability below which a pair is left out, as in the result of the fusion."""
+"""Association probability below which a pair is left out, as in the result of the fusion. Halved,
+it changes mean IDF1 by 0.001; with 0.05 recall rises and IDF1 falls, no more than they scatter."""
 
 _CALIBRATION_SHARE = 0.9
-"""Least association probability of a box that is used for the self-calibration."""
+"""Least association probability of a box that is used for the self-calibration. From 0.5 to 0.97 it
+changes mean recall by at most 0.0003, mean IDF1 by 0.003, and the error of positions by 1 mm."""
 
 _NOISE_SHARE = 0.5
 """Least association probability of a box by which the noise is estimated: it is likelier the
-track's than not."""
+track's than not. At 0.25 and 0.75 the mean share of positions within the reported ellipse of 95 %
+changes by 0.004 at most."""
 
 _MEDIAN = 0.4549
 """Median of χ² with one degree of freedom, 0.6745²."""
 
 _SCALE_TIME = 8.0
-"""Time constant with which the process-noise scale of a path changes, seconds."""
+"""Time constant with which the process-noise scale of a path changes, seconds. Halved or doubled,
+it changes mean recall and IDF1 by at most 0.001, and the error of positions by at most 2 mm."""
 
 _SCALE_PRIOR = 0.5
-"""Weight of the prior s = 1 of the process-noise scale, seconds of a path."""
+"""Weight of the prior s = 1 of the process-noise scale, seconds of a path. Halved or doubled, it
+changes mean recall by at most 0.001, and nothing else by as much."""
 
 _LARGEST_RATIO = 2.0
 """Bound of the contribution of one step, as a factor on the previous scale, so that a single turn
-or a wrong association does not raise the scale."""
+or a wrong association does not raise the scale. With 1.5 mean recall falls by 0.001 and IDF1 by
+0.004; without a bound mean recall changes by less than 0.001, and in crowds IDF1 by 0.006, a
+quarter of its standard error."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

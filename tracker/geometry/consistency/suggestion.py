@@ -26,35 +26,43 @@ m (:data:`tracker.single_view.box_sizes.STATURE`); the width is that of the body
 [FRU71]."""
 
 LEAST_AGREEING = 20
-"""Least number of agreeing pairs of boxes for an estimate of room and people."""
+"""Least number of agreeing pairs of boxes for an estimate of room and people. In thirty random
+rooms with the boxes of other rooms, five steps have at most 7 by chance and twenty at most 23;
+with the right boxes two steps have 20 in the median."""
 
-# The sensitivities below are measured in the random rooms of seeds 1300 … 1303.
+# The sensitivities below are measured in the random rooms of seeds 1500 … 1519, of whose people
+# some are 1.2 m tall and some are seen for 12 steps alone, and in four recordings.
 _SHORTEST_STANDING = 1.45
 """Height above which people stand, metres: the crown of a seated man has a 95th percentile of
-0.965 m above the seat and the seat one of 0.49 m [PHE96]."""
+0.965 m above the seat and the seat one of 0.49 m [PHE96]. At 1.6, boxes of one room of people who
+stand are taken for others."""
 
 _TALLEST_STANDING = 2.3
-"""Height of boxes below which people stand, metres. A tenth more or less changes nothing."""
+"""Height of boxes below which people stand, metres. From 2 to 2.6 nothing changes."""
 
 _TRUST = 0.3
 """Weight of the boxes' height against that of :data:`STANDING`, since detectors pad boxes. Halved
-or doubled it changes sizes and the floor by 0.02 m at most."""
+or doubled it changes sizes and the floor by 0.02 m at most, and no figure of tracks in eight random
+rooms and two recordings by 0.001; without it mean IDF1 falls by 0.004, with 1 by 0.017."""
 
 _MARGIN = 0.5
 """Extent of the room beyond the places of people, metres: a first guess, which the user sees and
-corrects."""
+corrects. With it 98 % of the true places are in the room, doubled 98 and without it 96; in eight
+random rooms and two recordings recall is 0.027 less without it, and 0.001 more with twice."""
 
 _OUTLIERS = 0.01
-"""Share of the places on either side that may be outside the room. Halved it moves a wall by 0.5 m
-at most, doubled by 0.8 m."""
+"""Share of the places on either side that may be outside the room. Halved it moves a wall
+by 1.3 m at most, doubled by 1.1 m; without it one wall is 6.5 m farther away."""
 
 _NEAR_ZERO = 0.2
 """Distance of seated people's feet from z = 0 within which they are on it, in heights of their
-boxes. It has no effect where people stand."""
+boxes. From 0.1 to 0.4 nothing changes; without it the floor of a room of seated people is 0.8 m
+lower. It has no effect where people stand."""
 
-_FARTHEST = 30.0
+_FARTHEST = 15.0
 """Largest distance between a camera and the overlap of views in a recording without boxes, metres:
-a first guess like the margin."""
+a first guess like the margin. With it 98 % of the true places are in the room, halved 86 and
+doubled nearly all, but then the walls are 7 m farther away in the mean."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +178,7 @@ def _from_views(
     ).reshape(-1, 2)
     seen = np.zeros(len(ground), dtype=int)
     for camera in cameras:
-        near = np.linalg.norm(ground - camera.centre[:2], axis=1) < _FARTHEST / 2.0
+        near = np.linalg.norm(ground - camera.centre[:2], axis=1) < _FARTHEST
         own = np.ones(len(ground), dtype=bool)
         for height in (0.3, 1.5):
             own &= camera.sees(np.column_stack([ground, np.full(len(ground), height)]))

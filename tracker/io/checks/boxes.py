@@ -39,14 +39,33 @@ from tracker.sequences.sequence import Sequence
 AS_GIVEN = Reading()
 """How a sequence's file is read."""
 
-# What is measured of recordings that are read rightly is of the random rooms of seeds 0 … 11, with
-# 200 steps; each bound lies far from it, for it is a mistake that is sought and not an error.
-_SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be, there 0.93 to 1.03
-_SMALLEST = 0.08  # metres: not half a head, which is 0.13 of a stature [DC66]
-_TALLEST_TARGET = 2.72  # metres: the tallest person on record; a taller target is not in metres
-_LEAST_INSIDE = 0.25  # of the people, of whom all are in the room there
-_FLOOR_OFF = 0.5  # metres, there at most 0.04
-_TILT = np.radians(20.0)  # there at most 1°
+# What is measured is of the random rooms of seeds 1500 … 1511, with 200 steps, and of five
+# recordings, all read rightly: halved or doubled, no bound warns of one of them. Each lies far from
+# what is measured, for it is a mistake that is sought and not an error.
+_SMALLER, _TALLER = 0.6, 1.6
+"""Bounds of the height of boxes, in that of the target; it is 0.94 to 1.07 there. A target of 0.7
+to 1.4 times the height is not named, one of half or twice is; with 0.8 and 1.2 those of 0.7 and 1.4
+are, too."""
+
+_SMALLEST = 0.08
+"""Least height of people, metres: not half a head, which is 0.13 of a stature [DC66]."""
+
+_TALLEST_TARGET = 2.72
+"""Largest height of a target, metres: that of the tallest person on record (R. Wadlow, 1940)."""
+
+_LEAST_INSIDE = 0.25
+"""Share of the people in the room below which it is named; it is at least 0.98 there. Of 17 rooms
+that are moved by 2 m none is named, by 4 m 7 and by 8 m 15; with half the share 5 and 15, with
+twice 9 and 17."""
+
+_FLOOR_OFF = 0.5
+"""Distance of the floor from people's feet above which it is named, metres; it is at most 0.06
+there. A floor that is off by 0.6 m is named in all 16 where people stand, by 0.3 m in none; with
+half the distance both are, with twice neither."""
+
+_TILT = np.radians(20.0)
+"""Angle between people and the z axis above which it is named, radians; it is at most 1.8° there,
+and that of worlds turned by 5 to 40° is found to 1.1°."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

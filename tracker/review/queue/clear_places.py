@@ -11,19 +11,23 @@ from tracker.corrections.kinds import REACH
 from tracker.review.queue.item import TrackRows
 from tracker.review.queue.moves import Move, Tracklet
 
-_WIDTHS = 4.0
-"""Least distance of a clear place from the nearest other track, in target widths: a correction
-that is made a little beside the place is then still nearest to its track."""
-
-_FARTHEST = 2.0 * REACH
-"""Largest value of this least distance, metres."""
+# The sensitivities below are of the queues of six random crowds of twelve people, of four random
+# rooms that people leave, whose detectors miss a third, and of three recordings, with and without
+# smoothing: 381 items, 105 of whose first fifteen are true.
+_CLEAR = 2.0 * REACH
+"""Least distance of a clear place from the nearest other track, metres: a correction that is made a
+little beside the place is then still nearest to its track. Halved, 103 of the first fifteen are
+true; from twice on, 107."""
 
 _ASIDE, _FEWEST = 0.4, 2
 """Time, in seconds, and least number of steps around the moment of a move at which the track may
-lie between two persons."""
+lie between two persons. At these rates the number counts: without it, 107 are true, and with twice
+as many, or with 0.8 s, 110 and 108."""
 
 _LONGEST = 5.0
-"""Time before and after the moment of a move within which a clear place is searched, seconds."""
+"""Time before and after the moment of a move within which a clear place is searched, seconds.
+Halved, 102 are true; doubled 118, and unlimited 126, but of 26 items fewer, since moves of other
+moments lead to the same place; twelve truthful answers win as much IDF1 in six rooms."""
 
 
 class ClearPlaces:
@@ -35,16 +39,14 @@ class ClearPlaces:
     camera has a box are not clear.
     """
 
-    def __init__(self, track_rows: TrackRows, step_time: float, width: float) -> None:
+    def __init__(self, track_rows: TrackRows, step_time: float) -> None:
         """Compute the distance of each row to the nearest other track.
 
         Args:
             track_rows: The tracks of the run.
             step_time: Duration of a step, seconds.
-            width: Width of a target, metres.
         """
         self._track_rows, tracks = track_rows, track_rows.tracks
-        self._clear = min(_WIDTHS * width, _FARTHEST)
         self._longest = max(round(_LONGEST / step_time), 1)
         self._aside = max(round(_ASIDE / step_time), _FEWEST)
         self._apart: Float[ndarray, " N"] = np.full(len(tracks), np.inf)
@@ -66,7 +68,7 @@ class ClearPlaces:
         aside = own[self._track_rows.tracks.frames[own] <= step - self._aside]
         own = aside if len(aside) else own
         apart = self._apart[own]
-        clear = np.flatnonzero(apart >= self._clear)
+        clear = np.flatnonzero(apart >= _CLEAR)
         best = clear[-1] if len(clear) else len(own) - 1 - np.argmax(apart[::-1])
         return self._track_rows.of_row(int(own[best]))
 
@@ -81,7 +83,7 @@ class ClearPlaces:
         aside = own[self._track_rows.tracks.frames[own] >= step + self._aside]
         own = aside if len(aside) else own
         apart = self._apart[own]
-        clear = np.flatnonzero(apart >= self._clear)
+        clear = np.flatnonzero(apart >= _CLEAR)
         return self._track_rows.of_row(int(own[clear[0] if len(clear) else np.argmax(apart)]))
 
     def move(self, move: Move) -> Move:

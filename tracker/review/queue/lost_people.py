@@ -14,7 +14,7 @@ from tracker.runs.run import Run
 
 _LONGEST = 20.0
 """Longest time after which a lost person may come back, and time constant of the probability of it,
-seconds."""
+seconds. Halved or doubled it changes 15 joins to 19 or 17, and none is found more or less."""
 
 _SPEED = 0.6
 """Standard deviation of the velocity of a lost person along each axis, metres per second. In one
@@ -31,7 +31,8 @@ _NEAR = 0.4
 of tracks err by less than 0.6 m in three recordings and ten random crowds."""
 
 _EDGE = 0.5
-"""Distance from the room's sides within which people leave and come, metres."""
+"""Distance from the room's sides within which people leave and come, metres. Halved or doubled, the
+log loss of the probability of a join is 0.60 or 0.77 instead of 0.45."""
 
 _LEAVES_AT_AN_EDGE, _LEAVES_INSIDE = 0.9, 0.2
 """Prior probability that the person of a track has left the room where the track ends: at a side or

@@ -18,14 +18,15 @@ from tracker.review.queue.moves import Move, Tracklet
 
 _REACH = 0.7
 """Largest distance at which two tracks of the two runs may follow one person, metres on the
-ground."""
+ground. Halved or doubled, 79 or 81 mistakes are found."""
 
 _LASTING = 0.6
 """Least time for which a track must be paired with a track of the other run, seconds; shorter
-pairings occur where another person passes by."""
+pairings occur where another person passes by. Halved or doubled, 78 or 79 mistakes are found."""
 
 _FOR, _AGAINST = 2.5, -2.5
-"""Addend to the log odds of a move with which the other run agrees, or disagrees."""
+"""Addend to the log odds of a move with which the other run agrees, or disagrees. Halved, 80
+mistakes are found, but of 400 items; doubled 74, of 247."""
 
 
 def _same(pairs: list[tuple[int, int]]) -> list[bool]:

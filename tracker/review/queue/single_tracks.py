@@ -14,23 +14,25 @@ from tracker.corrections.kinds import KINDS
 from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.moves import Move, Tracklet
 from tracker.runs.run import Run
+from tracker.smoothing.tracklets.costs import FASTEST
 
 _SHORT = 1.0
 """Time constant with which the probability that a track is clutter falls with the track's length,
-seconds."""
+seconds. Halved or doubled, 1 or 8 tracks are asked about instead of 2, and as many mistakes found.
+"""
 
 _LONG = 5.0
-"""Time constant of the part of this probability that is due to few boxes, seconds."""
+"""Time constant of the part of this probability that is due to few boxes, seconds. Halved or
+doubled, 1 or 3 tracks are asked about instead of 2, and as many mistakes found."""
 
 _FORGOTTEN = 5.0
 """Time constant with which the probability that a track follows another person after a gap grows
-with the gap, seconds."""
+with the gap, seconds. Halved or doubled, 19 or 16 gaps are asked about instead of 18, and 79 or 80
+mistakes are found."""
 
 _UNSEEN = 1.0
-"""Longest gap without a box of any camera for which no item is made, seconds."""
-
-_FASTEST = 3.0
-"""Speed above which a track may jump to another person, metres per second."""
+"""Longest gap without a box of any camera for which no item is made, seconds. Halved or doubled, 42
+or 11 gaps are asked about instead of 18, and 75 or 79 mistakes are found."""
 
 
 def items(run: Run, track_rows: TrackRows) -> Iterator[ReviewItem]:
@@ -107,21 +109,22 @@ def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
 def _fast(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
     """Yield moves where a track is faster than people walk.
 
-    The probability of a jump is taken as 0.3 times the ratio of the speed to :data:`_FASTEST`, and
-    at most 0.9.
+    The probability of a jump is taken as 0.3 times the ratio of the speed to :data:`FASTEST`, and
+    at most 0.9. With half of this speed 225 jumps are asked about instead of 11, and 68 mistakes
+    are found; with twice 1 jump, and 80 mistakes.
     """
     rows, tracks = track_rows.rows[track], run.tracks
     frames, ground = tracks.frames[rows], tracks.positions[rows, :2]
     seconds = np.diff(frames) * run.sequence.step_time
     speed = np.linalg.norm(np.diff(ground, axis=0), axis=1) / np.maximum(seconds, 1e-9)
-    fast = np.flatnonzero(speed > _FASTEST)
+    fast = np.flatnonzero(speed > FASTEST)
     for k in fast[np.diff(fast, prepend=-9) > 1].tolist():
         before, after = track_rows.of_row(int(rows[k])), track_rows.of_row(int(rows[k + 1]))
         # stands for both tracklets: the earlier one ends before the cut, the later begins after it
         tracklet = Tracklet(track, begin=after, end=before)
         title = f"Track {track} jumps: {speed[k]:.1f} m/s at step {after.step}"
-        log_odds = _log_odds(min(0.3 * speed[k] / _FASTEST, 0.9))
-        why = f"people walk at most {_FASTEST:g} m/s"
+        log_odds = _log_odds(min(0.3 * speed[k] / FASTEST, 0.9))
+        why = f"people walk at most {FASTEST:g} m/s"
         yield Move((tracklet,), (tracklet,), "fast", log_odds, why, title)
 
 

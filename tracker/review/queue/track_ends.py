@@ -19,28 +19,33 @@ from tracker.review.queue.unclaimed import Unclaimed, find_unclaimed
 from tracker.runs.run import Run
 
 _MISSED = 0.3
-"""Probability that a camera has no box for a while of a person in its picture."""
+"""Probability that a camera has no box for a while of a person in its picture. Halved, no end of a
+track is asked about instead of 25, and 79 mistakes are found; doubled 46 ends and 7 beginnings, and
+78 mistakes."""
 
 _WALK = 1.0
 """Speed at which a missed person is assumed to walk from an entrance or side of the room, metres
-per second."""
+per second. Halved, 37 ends and 3 beginnings are asked about, and 74 mistakes are found; doubled 7
+ends, and 79 mistakes."""
 
 _ASIDE = 0.5
 """Time before a track begins, or after it ends, at which the person may have been there without a
-track, seconds."""
+track, seconds. Halved it changes no item; doubled, 3 ends fewer are asked about."""
 
 _ACCURACY = 0.3
-"""Standard deviation of the place of a missing person in the proposed corrections, metres."""
+"""Standard deviation of the place of a missing person in the proposed corrections, metres. Of
+158 places in three random crowds nine tenths err by at most 0.12 m; one in twenty is off by more
+than 1.4 m, where boxes of two people meet."""
 
+# Of 284 people who are missing, since tracks were cut or taken out in three random crowds, in two
+# rooms that people leave, and in two recordings, 208 are.
 _APART = 1.0
-"""Least time between two places of a proposed path of a missing person, seconds."""
+"""Least time between two places of a proposed path of a missing person, seconds. With it 207
+of the items can be answered truthfully, halved 201 and doubled 205."""
 
 _MOST_PLACES = 12
-"""Largest number of places of a proposed path."""
-
-_NEAR, _WHILE = 1.0, 1.0
-"""Largest distance, in metres, and time, in seconds, between the begin or end of a track and
-unclaimed boxes that may be of the same person."""
+"""Largest number of places of a proposed path, each of which becomes a correction. With 2, 204 can
+be answered; from 6 on 207."""
 
 
 def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Iterator[ReviewItem]:
@@ -57,32 +62,15 @@ def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Ite
         asked: The first and last places of tracks that items of other sources concern, for which
             no item is made here.
     """
-    free = find_unclaimed(run)
-    yield from (_missing(run, one) for one in free)
+    yield from (_missing(run, one) for one in find_unclaimed(run))
     near = leeway(run.sequence.step_time)
     for track in track_rows.ids.tolist():
         rows = track_rows.rows[track]
         first, last = track_rows.of_row(int(rows[0])), track_rows.of_row(int(rows[-1]))
-        if first.step > near and first not in asked and not _shown(first, free, run, before=True):
+        if first.step > near and first not in asked:
             yield from _edge(run, track_rows, track, before=True)
-        if (
-            run.complete
-            and last.step < run.sequence.frames - 1 - near
-            and last not in asked
-            and not _shown(last, free, run, before=False)
-        ):
+        if run.complete and last.step < run.sequence.frames - 1 - near and last not in asked:
             yield from _edge(run, track_rows, track, before=False)
-
-
-def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bool:
-    """Whether unclaimed boxes show where the person of a track was before a place, or after it."""
-    for one in free:
-        end = one.places[-1 if before else 0]
-        seconds = (place.step - end.step) * run.sequence.step_time * (1 if before else -1)
-        apart = float(np.hypot(place.x - end.x, place.y - end.y))
-        if -_WHILE <= seconds <= _WHILE and apart <= _NEAR + _WALK * abs(seconds):
-            return True
-    return False
 
 
 def _missing(run: Run, one: Unclaimed) -> ReviewItem:

@@ -19,25 +19,30 @@ from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
 from tracker.runs.run import Run
 
+# The sensitivities below are of the items of missing people, where tracks were cut or taken out: in
+# three random crowds, in two random rooms that people leave and whose detectors miss a third, and
+# in two recordings. There are 284 items, of which 208 are right.
 _MISS = 0.3
-"""Largest distance between the rays through the centres of two boxes of one person, metres."""
+"""Largest distance between the rays through the centres of two boxes of one person, metres. Halved,
+there are 264 items of which 202 are right; doubled 314, of which 214 are."""
 
 _SIZE = 1.6
 """Largest ratio of the height of a box to that of a target's box at the place; its inverse is the
-smallest."""
+smallest. With 1.3 there are 257 items of which 218 are right; with 2.5 303, of which 180 are."""
 
 _REACH, _FASTEST = 0.5, 2.0
 """Largest distance between consecutive places of one person: a constant in metres, plus a speed in
-metres per second times the time between them."""
+metres per second times the time between them. With half the constant there are 300 items of which
+241 are right, with twice 264 and 174, since the places of two people are joined; with half the
+speed 280 and 210, with twice 291 and 214."""
 
 _PAUSE = 0.5
-"""Longest gap between consecutive places of one person, seconds."""
+"""Longest gap between consecutive places of one person, seconds. Halved, there are 58 items of
+which 55 are right, as a step is 0.2 to 0.5 s; doubled 274, of which 184 are."""
 
 _LASTS = 1.0
-"""Least time between the first and the last step at which boxes agree on a person, seconds."""
-
-_SHARE = 0.5
-"""Least share of the steps between the first and the last one at which boxes agree."""
+"""Least time between the first and the last step at which boxes agree on a person, seconds. Halved,
+there are 329 items of which 247 are right; doubled 228, of which 156 are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +210,7 @@ def _chains(points: Float[ndarray, "M 6"], step_time: float) -> Iterator[Unclaim
         steps = np.unique(rows[:, 0])
         span = steps[-1] - steps[0] + 1
         share = float(len(steps) / span)
-        if span * step_time < _LASTS or share < _SHARE:
+        if span * step_time < _LASTS:
             continue
         middles = [rows[rows[:, 0] == step, 1:4].mean(axis=0) for step in steps]
         places = tuple(

@@ -42,11 +42,12 @@ FILE = Path(__file__).with_name("calibration.json")
 recording."""
 
 _WITHIN = 0.9
-"""Share of the nearest runs of the calibration whose error lies in the interval."""
+"""Share of the nearest runs of the calibration whose error lies in the 90 % interval."""
 
 _ALIKE = 60
-"""The number of runs of the calibration, those with the nearest estimates, that give the
-interval."""
+"""The number of runs of the calibration, those with the nearest estimates, that give the interval.
+Made from four of the five recordings, it contains IDF1 of 80 % of the runs of the fifth; with 15 of
+75 %, with 30 of 80 % and with 120 of 86 %."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,8 @@ from tracker.smoothing.tracklets.appearance import AppearanceModel
 from tracker.smoothing.tracklets.motion import Ends, Pairs, motion_gains, near_pairs
 
 FASTEST = 3.0
-"""Largest speed of a person in a room over several steps, metres per second."""
+"""Largest speed of a person in a room over several steps, metres per second. Halved, it changes
+mean recall and IDF1 by at most 0.001; doubled, IDF1 in crowds by 0.005, one exchange."""
 
 KEEPING = 2.0
 """Log odds that the filter's label adds to a link over a longer gap. From 0 to 8, no figure of the

@@ -27,10 +27,12 @@ From 0.1 to 0.9 no figure of four random crowds and four recordings changes: nea
 box of its own or none."""
 
 _AROUND_A_JUMP = 0.2
-"""Seconds before and after a jump that are left out of both tracklets."""
+"""Seconds before and after a jump that are left out of both tracklets. Without it no figure changes
+by more than it scatters; doubled, recall in recordings falls by 0.007 and IDF1 by 0.005."""
 
 _SHORTEST = 0.4
-"""Shortest tracklet, seconds; shorter ones are left out where their path has longer ones."""
+"""Shortest tracklet, seconds; shorter ones are left out where their path has longer ones. Halved
+and without it, mean IDF1 changes by at most 0.002; doubled, recall in recordings falls by 0.007."""
 
 
 @dataclass(slots=True, eq=False)
