@@ -97,6 +97,8 @@ def test_log_odds_need_every_part_of_a_recording() -> None:
     assert log_odds(zero, steady) == -log_odds(steady, zero)
     assert log_odds(steady, steady) == 0.0
     assert log_odds(zero + 1.0, zero) == 100.0  # each part alike
+    # mean 2 and spread 1 of three parts: z² = 12, and 3/2 ln(1 + 12/2)
+    assert log_odds(np.array([1.0, 2.0, 3.0]), np.zeros(3)) == pytest.approx(1.5 * np.log(7.0))
     assert log_odds(0.01 * steady, zero) == pytest.approx(0.01 * steady.sum())  # never above ΔE
 
 
