@@ -44,7 +44,10 @@ def import_files(command: Import) -> int:
         raise CommandError(f"{command.output}: holds a {FILE} already; name another folder")
     for folder in command.sources:
         if (folder / FILE).is_file():
-            say(f"{folder}: has a {FILE}: every command takes it without an import")
+            raise CommandError(
+                f"{folder}: has a {FILE}, so that every command takes it as it is; name its files, "
+                "to have them read anew"
+            )
     sources = [*command.sources]
     sources += _not_inside((path for _, path in options.cameras), command.sources)
     waited: list[str] = []
