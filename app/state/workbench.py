@@ -48,6 +48,7 @@ from tracker.parameters.values import (
 )
 from tracker.review.template_suggestions import Suggestion
 from tracker.runs.pipeline import Progress, Run
+from tracker.sequences.built_in import place_of
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
@@ -497,7 +498,9 @@ class Workbench:
         """
         with self._edit() as now:
             if now.sequence is not None and shown.views is now.sequence.views:
-                self._put("taught", sequence=shown, saved=saved)
+                moved = shown.folder != now.sequence.folder
+                opened_as = place_of(shown.folder) if moved else now.opened_as
+                self._put("taught", sequence=shown, saved=saved, opened_as=opened_as)
 
     def correct(self, sequence: Sequence, corrections: tuple[Correction, ...]) -> None:
         """Have the open recording with these corrections; the run that obeys them follows.

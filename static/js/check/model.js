@@ -137,10 +137,6 @@ function createCheck({ store, actions, playback }) {
 	}
 
 	state.on(["told"], ({ told }) => store.set({ names: told?.names ?? {} }));
-	store.watch(["sequence"], () => {
-		state.set(empty);
-		store.set({ signs: { ...store.get().signs, check: "" } });
-	});
 	/** @type {Timer} */
 	let waiting;
 	/** What follows one another at once is asked about once. @param {number} rest  milliseconds */
@@ -149,6 +145,12 @@ function createCheck({ store, actions, playback }) {
 		waiting = setTimeout(() => void refresh(), Math.max(0, rest));
 	}
 	let [heard, count] = ["", 0];
+	store.watch(["sequence"], () => {
+		state.set(empty);
+		store.set({ signs: { ...store.get().signs, check: "" } });
+		// Of a copy, in which the page goes on, lanes and corrections are as they were.
+		if (store.get().timeline) soon(100);
+	});
 	// Lanes of another run come first: who opens one waits for them.
 	store.on(["server", "timeline"], ({ server, timeline }) => {
 		const now = `${server?.corrections?.key} ${timeline?.run}`;

@@ -318,6 +318,7 @@ def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     shown = done(client)
     answer = changed(client, "copy_taught", folder="mine")
     assert answer["sequence"]["name"] == "mine"
+    assert answer["sequence"]["opened_as"] == str(walkers.parent / "mine")
     assert answer["teaching"]["unsaved"] == 0
     assert (answer["run"]["key"], answer["run"]["state"]) == (shown["run"]["key"], "done")
     exported = client.get("/api/export/tracks.csv")  # of the run before, by the name of the copy

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -414,3 +415,22 @@ def test_a_new_person_with_a_small_window_has_the_place_and_its_buttons_in_sight
         button = page.locator("#panel-place").get_by_role("button", name=name)
         expect(button.first).to_be_in_viewport(ratio=1.0)
     context.close()
+
+
+def test_a_copy_goes_on_with_its_places_corrections_and_address(
+    check: Page, server: Server, tmp_path: Path
+) -> None:
+    folder = server.get("/api/state").json()["sequence"]["opened_as"]
+    server.command("correct", corrections=[{"kind": "checked", "first": 0, "last": 9}])
+    server.wait_for_run()
+    said = check.get_by_text("steps 0 – 9 checked")
+    expect(said.first).to_be_visible(timeout=20_000)
+    expect(places(check).first).to_be_visible(timeout=20_000)
+    count = places(check).count()
+    copied = tmp_path / "copied"
+    server.command("copy_taught", folder=str(copied))
+    until(check, lambda: str(copied) in parse_qs(urlsplit(check.url).query)["seq"], "its address")
+    expect(places(check)).to_have_count(count, timeout=20_000)
+    expect(said.first).to_be_visible(timeout=20_000)
+    ask(server, "POST", "sequence", {"name": folder})
+    server.wait_for_run()
