@@ -329,6 +329,15 @@ def test_a_fetched_network_is_the_default_for_large_standing_people(recording: S
     assert advice(untaught, RunParameters(single_view="shapes")) is None
 
 
+def test_boxes_that_are_not_used_since_a_camera_has_none_are_named(recording: Sequence) -> None:
+    first, *others = recording.views
+    assert others
+    some = replace(recording, views=(replace(first, detections=None), *others))
+    words = advice(some, RunParameters(single_view="shapes"))
+    assert words == f'no camera\'s boxes are used, since camera "{first.camera.name}" has none'
+    assert advice(recording, RunParameters(single_view="colour_phd")) is None
+
+
 def scaled(camera: Camera, factor: float) -> Camera:
     """The same camera with larger pictures."""
     intrinsics = camera.intrinsics.copy()

@@ -61,12 +61,17 @@ def suits_detector(sequence: Sequence) -> bool:
 
 
 def advice(sequence: Sequence, parameters: RunParameters) -> str | None:
-    """Say that a detection network can be fetched, where it would be the default method.
+    """Say that boxes of some cameras alone are not used, or that a detection network can be
+    fetched, where it would be the default method.
 
     Args:
         sequence: The recording.
         parameters: The parameters of the run.
     """
+    without = [view.camera.name for view in sequence.views if view.detections is None]
+    used = method_of("single_view", parameters.single_view).used(parameters)
+    if 0 < len(without) < len(sequence.views) and not used.detections:
+        return f"no camera's boxes are used, since {_listed(without)} has none"
     by_shape = parameters.single_view == default_parameters(sequence).single_view == "shapes"
     if not by_shape or sequence.detector is not None or not suits_detector(sequence):
         return None

@@ -97,7 +97,7 @@ class DetectorBoxes:
         if view.detections is None:
             raise ValueError(
                 f'camera "{view.camera.name}" of {sequence.name} has no detections; name a CSV '
-                "file as its `detections` in sequence.toml, or choose single_view colour_phd"
+                "file as its `detections` in sequence.toml, or a single_view that needs no boxes"
             )
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
