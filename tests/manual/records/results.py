@@ -72,8 +72,7 @@ IDENTITY = """## Identity without truth
 Each recording was tracked with random settings; of each the estimate J without ground truth
 ([Methods](methods.md#identity-without-truth)) is compared with the true IDF1. The correlation is
 Spearman's, over the settings of one recording. The program takes the interval beside J from the
-same record, which is older than the others of this page: the present program tracks the same
-recordings somewhat differently. `python3 -m tests.benchmarks.engine.without_truth` makes it.
+same record, which `python3 -m tests.benchmarks.engine.without_truth` makes.
 """
 
 BOUNDS = (0.0, 0.5, 0.8, 0.95, math.inf)
