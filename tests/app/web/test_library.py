@@ -342,6 +342,11 @@ def test_runs_stay_when_the_recording_is_gone(kept: TestClient, data: Path, path
     answer = kept.post(f"/api/library/runs/{number}/open")
     assert answer.status_code == 422
     assert kept.get(f"/api/library/runs/{number}").status_code == 200
+    for form, state in (("csv", "done"), ("html", "failed")):
+        assert kept.post("/api/exports", json={"format": form, "run": number}).status_code == 200
+        wait_until(lambda: kept.get("/api/exports").json()["state"] != "writing")
+        assert kept.get("/api/exports").json()["state"] == state
+    assert "under Find…" in kept.get("/api/exports").json()["error"]
 
 
 def test_a_damaged_library_is_told_and_the_workbench_goes_on(data: Path, path: Path) -> None:
