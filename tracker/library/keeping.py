@@ -62,7 +62,7 @@ def record_of_recording(
         place=opened_as if rendered else str(sequence.folder.absolute()),
         name=sequence.name,
         kind="rendered" if rendered else "folder",
-        digest=sequence.digest,
+        digest=sequence.stored_digest or sequence.digest,
         cameras=len(sequence.views),
         frames=sequence.frames,
         fps=sequence.fps,

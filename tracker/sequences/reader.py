@@ -87,6 +87,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     templates = read_templates(fields, views, time.steps)
     ground_truth = read_ground_truth(fields, reading, time.steps)
     files = _states(reading)
+    digest = _digest(text, folder, files)
     return Sequence(
         name=fields.text("name"),
         folder=folder,
@@ -98,7 +99,8 @@ def read_sequence(folder: Path | str) -> Sequence:
         description=fields.text("description", ""),
         templates=templates,
         ground_truth=ground_truth,
-        digest=_digest(text, folder, files),
+        digest=digest,
+        stored_digest=digest,
         warnings=tuple(reading.warnings),
         files=files,
     )
@@ -275,6 +277,16 @@ def _states(reading: OpenedFiles) -> tuple[FileState, ...]:
             f'{reading.folder.name}/{FILE}: the file "{name}" was there and cannot be found any '
             f"more ({error.strerror}); put it back, then open the folder again"
         ) from None
+
+
+def saved_digest(sequence: Sequence) -> str:
+    """Return the digest of a sequence whose ``sequence.toml`` was just written.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    text = (sequence.folder / FILE).read_text(encoding="utf-8-sig")
+    return _digest(text, sequence.folder, sequence.files)
 
 
 def _digest(text: str, folder: Path, files: tuple[FileState, ...]) -> str:

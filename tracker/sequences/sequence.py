@@ -286,6 +286,9 @@ class Sequence:
     """The true positions of people; None if they are not known."""
     digest: str = field(default="")
     """A hash of sequence.toml and of size and time of every file that it names, for cache keys."""
+    stored_digest: str = field(default="")
+    """The digest of the files alone, without what was taught and is not saved, by which a moved
+    folder is recognised."""
     detector: DetectorFile | None = None
     """The network that may be run on the pictures; it is not part of :attr:`digest`."""
     warnings: tuple[str, ...] = ()
