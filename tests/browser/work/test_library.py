@@ -189,6 +189,28 @@ def test_a_run_is_opened_as_it_was_without_computing(library: Page, server: Serv
     server.wait_for_run()
 
 
+def test_a_folder_that_cannot_be_found_is_told_where_it_was_asked_for(
+    library: Page, server: Server
+) -> None:
+    folder = Path(server.get("/api/library").json()["recordings"][0]["place"])
+    moved = folder.with_name("elsewhere")
+    folder.rename(moved)
+    try:
+        library.reload()
+        place = library.get_by_role("textbox", name="Folder where the recording lies now")
+        place.fill(str(folder.with_name("nowhere")))
+        library.get_by_role("button", name="Find…").click()
+        refused = library.get_by_role("region", name="Runs").get_by_role("alert")
+        expect(refused).to_contain_text("there is no such folder")
+        expect(place).to_have_value(str(folder.with_name("nowhere")))
+    finally:
+        moved.rename(folder)
+    place.fill(str(folder))
+    library.get_by_role("button", name="Find…").click()
+    expect(place).to_be_hidden()
+    expect(refused).to_be_hidden()
+
+
 def test_a_run_is_pinned_as_a(library: Page, server: Server) -> None:
     library.locator('tr[data-run="2"]').click()
     expect(library.get_by_role("img", name="Lanes of run 2")).to_be_visible()
