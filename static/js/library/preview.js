@@ -34,6 +34,7 @@ export function preview({ store, actions }, written) {
 				? "Another version of the program, or another state of the recording, made it."
 				: "Its tracks were kept; what the cameras found comes back by computing again.",
 			{ word: "Compute again", act: actions.runAgain },
+			`run ${run.id}`,
 		);
 	}
 
