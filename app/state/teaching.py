@@ -617,6 +617,7 @@ def _moved(sequence: Sequence, copied: Sequence) -> Sequence:
         name=copied.name,
         folder=copied.folder,
         files=copied.files,
+        own_file=copied.own_file,
         stored_digest=copied.stored_digest,
     )
 

@@ -43,10 +43,10 @@ def _instead() -> Path:
     return Path(tempfile.mkdtemp(prefix="multiview-phd-"))
 
 
-def is_gone(folder: Path) -> bool:
-    """Whether a folder does not exist any more, in contrast to one that may not be read."""
+def is_gone(path: Path) -> bool:
+    """Whether a file or folder does not exist any more, in contrast to one that may not be read."""
     try:
-        folder.stat()
+        path.stat()
     except (FileNotFoundError, NotADirectoryError):
         return True
     except OSError:

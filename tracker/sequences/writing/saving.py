@@ -76,6 +76,8 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
     with _complaining(folder / FILE):
         check_own_file(folder)  # it may have become a link since it was read
         path = (folder / FILE).resolve()
+        # what another program wrote there since is still to be noticed afterwards
+        own = saved.own_file if saved.own_file is not None and saved.own_file.is_same else None
         before = path.read_bytes()
         text = rewritten(before.decode("utf-8-sig"), saved, sequence, where)
         backup = _keep(folder, before)
@@ -87,6 +89,8 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         except BaseException:
             backup.unlink(missing_ok=True)  # of a file that is as it was
             raise
+        if own is not None:
+            own.renew()
     return backup
 
 
