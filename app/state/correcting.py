@@ -13,7 +13,7 @@ from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.consistency import find_repeated, refuse_contradiction
 from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
-from tracker.files.folders import is_gone
+from tracker.files.folders import is_missing
 from tracker.review.queue import Queue, ReviewItem, queue
 from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.sequence import Sequence as Recording
@@ -32,10 +32,10 @@ def _mark_of(path: Path) -> tuple[int, int, int] | None:
     return found.st_ino, found.st_mtime_ns, found.st_size
 
 
-def _has_gone(recording: Recording) -> bool:
+def _is_missing(recording: Recording) -> bool:
     """Whether the folder that the log of a recording belongs to was moved or deleted; what opens by
     its name has its log in the settings."""
-    return is_gone(recording.folder) and not opens_by_name(recording.folder)
+    return is_missing(recording.folder) and not opens_by_name(recording.folder)
 
 
 def _written(corrections: Told, places: Sequence[Path]) -> Path:
@@ -81,7 +81,7 @@ class Correcting:
         with self._lock:
             if self._recording is None or _mark_of(self._log.path) == self._mark:
                 return
-            if _has_gone(self._recording):  # what it said counts as long as nobody says otherwise
+            if _is_missing(self._recording):  # what it said counts as long as nobody says otherwise
                 return
             before, self._log = self._log, open_log(self._recording.folder)
             self._mark = _mark_of(self._log.path)
@@ -158,7 +158,7 @@ class Correcting:
     def _put(self, corrections: Told) -> None:
         if self._recording is None:
             raise CorrectionError("no recording is open")
-        if _has_gone(self._recording):  # elsewhere the log would never be read again
+        if _is_missing(self._recording):  # elsewhere the log would never be read again
             raise CorrectionError(
                 f"{self._recording.folder} is not there any more: put the folder back, or open the "
                 "recording where it lies now"

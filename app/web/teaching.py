@@ -31,7 +31,7 @@ from app.web.dependencies import (
 )
 from app.web.pictures import checked, missing, picture_of
 from app.web.results import State
-from tracker.files.folders import is_gone
+from tracker.files.folders import is_missing
 from tracker.geometry.boxes import Boxes
 from tracker.parameters.catalogue import METHODS, method_of
 from tracker.sequences.built_in import opens_by_name
@@ -204,7 +204,7 @@ def _remark_on(sequence: Sequence) -> str | None:
     own = sequence.own_file
     if own is None or own.is_same:
         return None
-    if is_gone(own.path):
+    if is_missing(own.path):
         return f"{own.path} is not there any more: put it back."
     return f"{own.path.name} was changed by another program: open the recording again."
 

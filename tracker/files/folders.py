@@ -43,7 +43,7 @@ def _instead() -> Path:
     return Path(tempfile.mkdtemp(prefix="multiview-phd-"))
 
 
-def is_gone(path: Path) -> bool:
+def is_missing(path: Path) -> bool:
     """Whether a file or folder does not exist any more, in contrast to one that may not be read."""
     try:
         path.stat()

@@ -20,7 +20,7 @@ import tomlkit
 from tomlkit.items import AoT
 
 from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder, write_whole
-from tracker.files.folders import cache_folder, is_gone
+from tracker.files.folders import cache_folder, is_missing
 from tracker.sequences.built_in import built_in_name
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
@@ -47,7 +47,7 @@ def why_not_in_place(folder: Path) -> str | None:
         return f"{folder.name} comes with the program and is never written to"
     if folder.is_relative_to(cache_folder()):
         return f"{folder.name} lies in the cache, which may be emptied at any time"
-    if is_gone(folder):
+    if is_missing(folder):
         return f"{folder} is not there any more"
     if not os.access(folder, os.W_OK) or not os.access(folder / FILE, os.W_OK):
         return f"{folder} is a place that you may only read"
@@ -150,7 +150,7 @@ def _check_there(folder: Path, where: str) -> None:
     Raises:
         SequenceError: If it was moved or deleted.
     """
-    if is_gone(folder):
+    if is_missing(folder):
         raise SequenceError(
             f"{where}: cannot be saved, since {folder} is not there any more; put the folder back, "
             "then save again"
