@@ -240,7 +240,8 @@ def taught(bench: Bench, owners: Owned) -> Taught:
         sizes=dict(PRESETS),
         unsaved=changes(taught_values(saved), taught_values(sequence)),
         file=f"{sequence.folder.name}/sequence.toml",
-        read_only=owners.teaching.why_not_in_place(),
+        # a folder that is not there cannot be copied either
+        read_only=None if is_missing(sequence.folder) else owners.teaching.why_not_in_place(),
         remark=_remark_on(sequence),
         built_in=bool(opens_by_name(sequence.folder)),
         copy_to=str(owners.teaching.copy_folder()),

@@ -122,24 +122,6 @@ test("only a recording that this window did not ask for was opened in another", 
   }
 });
 
-test("a note on a stored run goes with the run", () => {
-  const { store, made, state } = receiver();
-  const shown = (kept) =>
-    made.receiveState({ ...state, run: { key: `${kept}`, state: "done", kept } }, true);
-  shown(3);
-  made.actions.note("warn", "run 3 is shown as it was", "", undefined, "run 3");
-  shown(3);
-  assert.equal(store.get().notes.length, 1);
-  made.actions.note("warn", "run 4 is shown as it was", "", undefined, "run 4");
-  shown(4);
-  assert.deepEqual(
-    store.get().notes.map(({ title }) => title),
-    ["run 4 is shown as it was"],
-  );
-  made.receiveState({ ...state, run: { key: "again", state: "computing", kept: null } }, true);
-  assert.deepEqual(store.get().notes, []);
-});
-
 /** A receiver of a recording with truth, whose requests are written down. */
 function receiver() {
   const { store, actions } = page([]);
@@ -153,14 +135,14 @@ function receiver() {
     store,
     actions,
     playback: { clear: nothing, receive: nothing },
-    address: { begin: nothing, arrive: nothing, waitsFor: () => false },
+    address: { begin: nothing, arrive: nothing },
     isOld: () => false,
   });
   const sequence = { key: "hall", name: "hall", opened_as: "hall", cameras: [], has_truth: true };
   const run = { key: "first", state: "computing", done: 40 };
   const state = { version: 1, parameters: {}, methods: {}, layers: {}, run, sequence };
   made.receiveState(state, true);
-  return { store, made: { ...made, actions }, asked, state };
+  return { store, made, asked };
 }
 
 test("figures are asked for once the server has some", async () => {

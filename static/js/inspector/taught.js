@@ -359,9 +359,7 @@ function saving({ unsaved, file, read_only: why, remark, built_in, copy_to: copy
 			h(
 				"label.wide",
 				{ title: why ?? "" },
-				why && !remark
-					? `${built_in ? "A built-in room" : "Read only"}: save a copy in`
-					: "Copy in",
+				why ? `${built_in ? "A built-in room" : "Read only"}: save a copy in` : "Copy in",
 				h("input", { name: "folder", id: "copy-folder", value: copy, required: true }),
 			),
 			h("button", { class: `btn ${why && unsaved.length ? "main" : "box"}` }, "Save a copy"),

@@ -70,9 +70,6 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			if (before.view !== server.view && typeof server.view === "number")
 				store.set({ large: server.view });
 		}
-		// What was said of a stored run holds as long as it is shown.
-		const kept = before?.run.kept;
-		if (kept && kept !== server.run.kept) actions.accepted(`run ${kept}`);
 		const { sequence } = server;
 		const same = sequence && JSON.stringify(sequence) === JSON.stringify(before?.sequence);
 		if (!same)
