@@ -85,7 +85,7 @@ def bundle(command: Bundle) -> None:
         LibraryError: If the library, or the run, is not as it must be.
     """
     from tracker.library.bundle import write_bundle
-    from tracker.sequences import library as sequences
+    from tracker.library.keeping import sequence_for_export
 
     output = command.output
     if output.suffix.lower() != ".zip":
@@ -94,7 +94,13 @@ def bundle(command: Bundle) -> None:
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
     with _library(command) as library:
         result = library.result(library.find(command.run).id)
-    sequence = sequences.open_sequence(result.place)
+        recording = library.recording(result.run.recording)
+    if recording.missing is not None:
+        raise CommandError(
+            f"a bundle needs the recording, and {recording.missing}: choose it in the page's "
+            "Library and name its new folder under Find…, or write its tracks by `runs export`"
+        )
+    sequence = sequence_for_export(recording)
     write_bundle(output, result, sequence, videos=command.videos)
     size = output.stat().st_size
     if command.json:
@@ -217,12 +223,11 @@ def _date(seconds: float) -> str:
 def _export(library: Library, command: ExportRun) -> None:
     from tracker.export.exported_run import Options
     from tracker.export.registry import format_of, save
-    from tracker.library.keeping import run_for_export
-    from tracker.sequences import library as sequences
+    from tracker.library.keeping import run_for_export, sequence_for_export
 
     form = format_of(command.output, command.format)
     result = library.result(library.find(command.run).id)
-    written = run_for_export(sequences.open_sequence(result.place), result)
+    written = run_for_export(sequence_for_export(library.recording(result.run.recording)), result)
     with Bar("writing", "step") as writing:
         options = Options(**dict(command.video), progress=writing.at)
         save(command.output, form, written, options)

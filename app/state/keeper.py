@@ -205,7 +205,7 @@ class Keeper:
             evaluation=None if scored is None else scored.evaluation,
             names=self._names(run),
         )
-        library.keep(record_of_recording(now.named(run.sequence), now.opened_as), new, self._keep)
+        library.keep(record_of_recording(now.saved or run.sequence, now.opened_as), new, self._keep)
         self._kept.add(key)
 
     def _score_again(self, now: Snapshot, number: int) -> None:

@@ -29,7 +29,7 @@ from tracker.runs import pipeline
 from tracker.runs.run import Run
 from tracker.sequences.built_in import EARLIER, earlier_key, key_of
 from tracker.sequences.errors import SequenceError
-from tracker.sequences.reader import FILE, given_folder
+from tracker.sequences.reader import FILE, given_folder, saved_digest
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import (
     Values,
@@ -286,7 +286,8 @@ class Teaching:
             sequence, saved = self.sequence(), self._workbench.snapshot().saved
             assert saved is not None
             backup = saving.save(sequence, saved)
-            self._workbench.mark_saved(sequence, sequence)
+            written = replace(sequence, stored_digest=saved_digest(sequence))
+            self._workbench.mark_saved(written, written)
             return backup
 
     def save_copy(self, folder: Path) -> Path:
@@ -610,8 +611,15 @@ class Teaching:
 
 
 def _moved(sequence: Sequence, copied: Sequence) -> Sequence:
-    """A sequence under the name and in the folder of its copy."""
-    return replace(sequence, name=copied.name, folder=copied.folder)
+    """A sequence under the name, in the folder and with the files of its copy."""
+    return replace(
+        sequence,
+        name=copied.name,
+        folder=copied.folder,
+        files=copied.files,
+        own_file=copied.own_file,
+        stored_digest=copied.stored_digest,
+    )
 
 
 def _defaults(sequence: Sequence) -> RunParameters | None:

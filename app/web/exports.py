@@ -15,11 +15,10 @@ from app.web.library import Kept
 from app.web.results import address_of
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS
-from tracker.library.keeping import run_for_export
+from tracker.library.keeping import run_for_export, sequence_for_export
 from tracker.runs import gaps
 from tracker.runs.fitting import default_parameters
 from tracker.runs.run import given_names, row_corrections
-from tracker.sequences import library as sequences
 
 router = APIRouter(prefix="/api/exports", responses=ERRORS)
 
@@ -111,9 +110,12 @@ def begin(
             raise ApiError(422, "cannot_export", sentence(error), field="format") from None
         return exporter.start(form, lambda: written, named.name, options)
     result = keeper.library().result(wish.run)
+    recording = keeper.library().recording(result.run.recording)
 
     def make() -> ExportedRun:
-        sequence = sequences.open_sequence(result.place)
+        sequence = sequence_for_export(recording)
+        if not sequence.views:
+            return run_for_export(sequence, result)
         back = address_of(base, result.place, result.parameters, default_parameters(sequence))
         return run_for_export(sequence, result, back)
 

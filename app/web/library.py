@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated, Literal
@@ -43,7 +42,6 @@ from tracker.library.store import Library
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import value_of
 from tracker.sequences import library as sequences
-from tracker.sequences.reader import FILE
 
 
 class RecordingInfo(Model):
@@ -246,17 +244,13 @@ def library(settings: Configured, keeper: Kept) -> LibraryInfo:
 
 
 def _recording(recording: Recording) -> RecordingInfo:
-    missing = None
-    # of the module, for a method fails at a folder that may not be read any more
-    if recording.kind == "folder" and not os.path.isfile(Path(recording.place) / FILE):
-        missing = f"there is no {FILE} in {recording.place} any more"
     return filled(
         RecordingInfo,
         recording,
         kind="rendered" if recording.kind == "rendered" else "folder",
         boxes_only=not recording.has_pictures,
         has_thumbnail=bool(recording.has_pictures),
-        missing=missing,
+        missing=recording.missing,
     )
 
 
@@ -284,7 +278,8 @@ async def move(recording: int, wish: Place, opened: Opened) -> RecordingInfo:
         raise ApiError(404, "no_recording", f"There is no recording {recording}.")
     with told_in_the_answer(known.name, field="place", hint="Its runs stay readable all the same."):
         sequence = await asyncio.to_thread(sequences.open_sequence, str(folder))
-        if sequence.digest != known.digest:
+        # that of a run is another where it was made with what was taught and not saved
+        if sequence.digest not in {known.digest, *(run.digest for run in opened.runs(recording))}:
             raise ValueError(
                 f"{folder}: expected the recording of which these runs are, found another "
                 f"content ({sequence.name})"
@@ -327,7 +322,8 @@ async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) 
     with told_in_the_answer(
         result.run.title,
         field="number",
-        hint="What was open still is; its tracks can be exported all the same.",
+        hint="What was open still is; its tracks can be exported all the same: as CSV, JSON, "
+        "Parquet or TRC where its recording is gone.",
     ):
         if place == result.place:
             jobs.show_kept(result)

@@ -31,10 +31,11 @@ from app.web.dependencies import (
 )
 from app.web.pictures import checked, missing, picture_of
 from app.web.results import State
+from tracker.files.folders import is_missing
 from tracker.geometry.boxes import Boxes
 from tracker.parameters.catalogue import METHODS, method_of
 from tracker.sequences.built_in import opens_by_name
-from tracker.sequences.sequence import PRESETS, Template
+from tracker.sequences.sequence import PRESETS, Sequence, Template
 from tracker.sequences.writing.teaching import changes, taught_values
 from tracker.single_view.pictures import colour
 
@@ -94,6 +95,8 @@ class Taught(Model):
     """The sequence's file, with its folder."""
     read_only: str | None
     """Why it can only be saved as a copy; null where it can be saved."""
+    remark: str | None
+    """That its file is not as it was when it was opened or saved; null where it is."""
     built_in: bool
     copy_to: str
     """A folder that is not there yet, to be offered for a copy."""
@@ -196,6 +199,16 @@ router = APIRouter(prefix="/api/teach", responses=ERRORS)
 Fetching = Annotated[DetectorFetching, of_app("detector_fetching")]
 
 
+def _remark_on(sequence: Sequence) -> str | None:
+    """Whether the file of a sequence was changed, moved or deleted by somebody else."""
+    own = sequence.own_file
+    if own is None or own.is_same:
+        return None
+    if is_missing(own.path):
+        return f"{own.path} is not there any more: put it back."
+    return f"{own.path.name} was changed by another program: open the recording again."
+
+
 @router.get("")
 def taught(bench: Bench, owners: Owned) -> Taught:
     """What the open sequence was taught, what its tracks offer, and how it can be saved."""
@@ -227,7 +240,9 @@ def taught(bench: Bench, owners: Owned) -> Taught:
         sizes=dict(PRESETS),
         unsaved=changes(taught_values(saved), taught_values(sequence)),
         file=f"{sequence.folder.name}/sequence.toml",
-        read_only=owners.teaching.why_not_in_place(),
+        # a folder that is not there cannot be copied either
+        read_only=None if is_missing(sequence.folder) else owners.teaching.why_not_in_place(),
+        remark=_remark_on(sequence),
         built_in=bool(opens_by_name(sequence.folder)),
         copy_to=str(owners.teaching.copy_folder()),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import shutil
 from collections.abc import Callable
@@ -22,6 +23,8 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.pictures.numbering import by_number, whole_row
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
+from tracker.sequences.writing import saving
+from tracker.sequences.writing.teaching import taught_values, with_taught
 
 STEPS = 30
 BY_PICTURES = {"single_view": "association_matrix"}
@@ -72,6 +75,33 @@ def test_a_video_spoilt_after_opening_is_told_and_nothing_is_kept(
     again = tracked(sequence, cache)
     assert not gaps.sentences(again)
     assert list(files.glob("*"))
+
+
+def test_another_description_on_disk_is_told_and_what_was_saved_here_is_not(
+    folder: Path, tmp_path: Path
+) -> None:
+    opened = read_sequence(folder)
+    run = tracked(opened)
+
+    def narrowed(sequence: Sequence, width: float) -> Sequence:
+        values = copy.deepcopy(taught_values(sequence))
+        values["room"]["max"][0] = width
+        return with_taught(sequence, values, "")
+
+    narrow = narrowed(opened, 1.5)
+    saving.save(narrow, opened)
+    assert narrow.changed_files() == ()
+    assert gaps.sentences(run) == [], "also of a run that began before"
+    copied = saving.save_copy(narrow, narrow, tmp_path / "copy")
+    with (folder / "sequence.toml").open("a", encoding="utf-8") as file:
+        file.write("# by hand\n")
+    assert copied.changed_files() == ()
+    (told,) = gaps.sentences(run)
+    assert told.startswith("sequence.toml changed or vanished since the recording was opened")
+    assert gaps.where_to_keep(run) == "nowhere"
+    saving.save(narrowed(opened, 1.25), narrow)  # what was written by hand is not taken up by it
+    assert gaps.sentences(run) == [told]
+    assert read_sequence(folder).changed_files() == ()
 
 
 def test_a_video_that_comes_back_before_the_end_is_looked_at_again(folder: Path) -> None:

@@ -346,6 +346,17 @@ def test_a_place_that_may_only_be_read_offers_the_copy(
         saving.save(taught(opened, add), opened)
 
 
+def test_a_folder_that_is_gone_says_so(folder: Path, tmp_path: Path) -> None:
+    opened = read_sequence(folder)
+    folder.rename(tmp_path / "elsewhere")
+    assert saving.why_not_in_place(folder) == f"{folder} is not there any more"
+    with pytest.raises(SequenceError, match="is not there any more; put the folder back"):
+        saving.save(taught(opened, add), opened)
+    with pytest.raises(SequenceError, match="is not there any more; put the folder back"):
+        saving.save_copy(taught(opened, add), opened, tmp_path / "copy")
+    assert not (tmp_path / "copy").exists()
+
+
 def test_a_rendered_room_is_never_altered(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(folder.parent))
     opened = read_sequence(folder)

@@ -42,8 +42,9 @@ class SequenceOfFile(_Model):
     """The number of steps per second."""
     frames: int = Field(ge=1)
     """The number of steps of the recording."""
-    half_extents: tuple[float, float, float]
-    """Half width, depth and height of a target, metres."""
+    half_extents: tuple[float, float, float] | None
+    """Half width, depth and height of a target, metres; null if the recording was not there any
+    more when its stored run was written, which then has no cameras either."""
     cameras: list[CameraOfFile]
     """The cameras, in the order of the recording."""
 
@@ -127,7 +128,7 @@ def write(path: Path, run: ExportedRun, options: Options) -> None:
             name=sequence.name,
             fps=sequence.fps,
             frames=sequence.frames,
-            half_extents=_triple(sequence.target_half_extents),
+            half_extents=_triple(sequence.target_half_extents) if sequence.views else None,
             cameras=[
                 CameraOfFile(name=c.name, width=c.image_size[0], height=c.image_size[1])
                 for c in sequence.cameras

@@ -35,6 +35,8 @@ class Format:
     none."""
     extra: str = ""
     """The extra of the program's package that installs this package; empty for none."""
+    needs_recording: bool = False
+    """Whether the cameras and the room of the recording are needed, or the size of a target."""
     needs_truth: bool = False
     """Whether the sequence must have ground truth."""
     needs_pictures: bool = False
@@ -46,6 +48,12 @@ class Format:
         Raises:
             ValueError: If the sequence lacks what the format needs, or a package is not installed.
         """
+        if not sequence.views and (self.needs_recording or self.needs_truth or self.needs_pictures):
+            raise ValueError(
+                f"{self.word} needs the recording, and there is none in {sequence.folder} any "
+                "more: choose it in the page's Library and name its new folder under Find…, or "
+                "write CSV, JSON, Parquet or TRC"
+            )
         if self.needs_truth and sequence.ground_truth is None:
             raise ValueError(
                 f"{self.word}: {sequence.name} has no truth that tracks could be set against; name "
@@ -96,7 +104,7 @@ FORMATS: dict[str, Format] = {
         ),
         Format(
             "motchallenge", "MOTChallenge", "", "a text a camera, in TrackEval's folders",
-            motchallenge.write, "application/zip",
+            motchallenge.write, "application/zip", needs_recording=True,
         ),
         Format(
             "json", "JSON", ".json", "tracks and parameters, by tracks.schema.json",
@@ -111,11 +119,12 @@ FORMATS: dict[str, Format] = {
         ),
         Format(
             "gltf", "glTF", ".glb", "boxes that move, for Blender and viewers of 3D",
-            gltf.write, "model/gltf-binary",
+            gltf.write, "model/gltf-binary", needs_recording=True,
         ),
         Format(
             "rerun", "Rerun", ".rrd", "a recording for Rerun's viewer",
             rerun_file.write, "application/octet-stream", "rerun", "rerun",
+            needs_recording=True,
         ),
         Format(
             "html", "HTML report", ".html", "figures and differences against the truth, one file",

@@ -8,6 +8,7 @@ import hashlib
 import platform
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -19,15 +20,16 @@ from tracker.corrections.outcomes import outcomes
 from tracker.evaluation import Evaluation
 from tracker.export.exported_run import ExportedRun
 from tracker.library.columns import KeptTracks
-from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
+from tracker.library.records import HEADLINES, NewRecording, NewRun, Recording, Result, Source
 from tracker.parameters.values import changed_values
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import Run, given_names
 from tracker.sequences.built_in import opens_by_name
+from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Room, Sequence
 
 THUMBNAIL = (144, 96)
 """Width and height of a recording's thumbnail, pixels: twice the size on the page."""
@@ -60,7 +62,7 @@ def record_of_recording(
         place=opened_as if rendered else str(sequence.folder.absolute()),
         name=sequence.name,
         kind="rendered" if rendered else "folder",
-        digest=sequence.digest,
+        digest=sequence.stored_digest or sequence.digest,
         cameras=len(sequence.views),
         frames=sequence.frames,
         fps=sequence.fps,
@@ -217,17 +219,42 @@ def remarks_of(result: Result) -> tuple[str, ...]:
     return pictures + ((f"{words} by a person applied",) if corrected else ())
 
 
+def sequence_for_export(recording: Recording) -> Sequence:
+    """Open the recording of stored runs that are exported.
+
+    If its folder was moved or deleted, the sequence has only what the library stores of it: name,
+    rate and number of steps, no camera, and NaN for the room and for the size of a target.
+
+    Raises:
+        SequenceError: If the recording is there and cannot be read.
+    """
+    if recording.missing is None:
+        return open_sequence(recording.place)
+    unknown = np.full(3, np.nan)
+    return Sequence(
+        recording.name,
+        Path(recording.place),
+        recording.fps,
+        recording.frames,
+        Room(unknown, unknown),
+        unknown,
+        views=(),
+    )
+
+
 def run_for_export(sequence: Sequence, result: Result, back: str = "") -> ExportedRun:
     """Return a stored run as the input of every export format.
 
     Args:
-        sequence: The recording.
+        sequence: The recording, of :func:`sequence_for_export`.
         result: The stored run.
         back: The URL of the page that shows the run; empty if there is none.
     """
     steps, tracks, seed = result.run.steps, result.kept.tracks, result.run.seed
     done = None if steps >= sequence.frames else steps
     words = remarks_of(result)
+    if not sequence.views:
+        words += (f"the recording was not in {sequence.folder} any more: boxes are left out",)
     return ExportedRun(sequence, tracks, result.parameters, seed, done, words, back=back)
 
 

@@ -100,6 +100,17 @@ class Library:
             found = connection.execute(f"SELECT {columns_of} FROM recordings ORDER BY opened DESC")
             return [Recording(*row) for row in found]
 
+    def recording(self, number: int) -> Recording:
+        """Return the recording with a number.
+
+        Raises:
+            LibraryError: If there is no such recording.
+        """
+        found = next((one for one in self.recordings() if one.id == number), None)
+        if found is None:
+            raise LibraryError(f"there is no recording {number}; read the list again")
+        return found
+
     def thumbnail(self, recording: int) -> bytes | None:
         """Return the JPEG thumbnail of a recording; None if it has none or does not exist."""
         with self._reading() as connection:

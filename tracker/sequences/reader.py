@@ -10,6 +10,7 @@ import hashlib
 import os
 import shlex
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,6 +67,7 @@ def read_sequence(folder: Path | str) -> Sequence:
             line or field.
     """
     folder, text = _find(Path(folder))
+    (own_file,) = _states(folder, [folder / FILE])
     fields = _parse(folder, text)
     reading = OpenedFiles(folder)
     frames = None
@@ -86,7 +88,8 @@ def read_sequence(folder: Path | str) -> Sequence:
         reading.warnings += check_view_of_room(view.camera, room)
     templates = read_templates(fields, views, time.steps)
     ground_truth = read_ground_truth(fields, reading, time.steps)
-    files = _states(reading)
+    files = _states(folder, reading.files)
+    digest = _digest(text, folder, files)
     return Sequence(
         name=fields.text("name"),
         folder=folder,
@@ -98,9 +101,11 @@ def read_sequence(folder: Path | str) -> Sequence:
         description=fields.text("description", ""),
         templates=templates,
         ground_truth=ground_truth,
-        digest=_digest(text, folder, files),
+        digest=digest,
+        stored_digest=digest,
         warnings=tuple(reading.warnings),
         files=files,
+        own_file=own_file,
     )
 
 
@@ -266,15 +271,25 @@ def _parse(folder: Path, text: str) -> Fields:
     return fields
 
 
-def _states(reading: OpenedFiles) -> tuple[FileState, ...]:
+def _states(folder: Path, files: Iterable[Path]) -> tuple[FileState, ...]:
     try:
-        return tuple(FileState.of(path) for path in reading.files)
+        return tuple(FileState.of(path) for path in files)
     except OSError as error:
         name = Path(str(error.filename)).name
         raise SequenceError(
-            f'{reading.folder.name}/{FILE}: the file "{name}" was there and cannot be found any '
+            f'{folder.name}/{FILE}: the file "{name}" was there and cannot be found any '
             f"more ({error.strerror}); put it back, then open the folder again"
         ) from None
+
+
+def saved_digest(sequence: Sequence) -> str:
+    """Return the digest of a sequence whose ``sequence.toml`` was just written.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    text = (sequence.folder / FILE).read_text(encoding="utf-8-sig")
+    return _digest(text, sequence.folder, sequence.files)
 
 
 def _digest(text: str, folder: Path, files: tuple[FileState, ...]) -> str:

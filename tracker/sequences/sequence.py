@@ -216,9 +216,9 @@ class View:
         return self.detector_ran is None or bool(self.detector_ran[step])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: all versions of a sequence share it, see `renew`
 class FileState:
-    """The state of a file when the sequence was opened."""
+    """The state of a file when the sequence was opened, or was last saved by the program."""
 
     path: Path
     """The path of the file."""
@@ -244,6 +244,15 @@ class FileState:
             return FileState.of(self.path) == self
         except OSError:
             return False
+
+    def renew(self) -> None:
+        """Take the present state of the file, which the program itself has just written.
+
+        Raises:
+            OSError: If the file does not exist.
+        """
+        now = FileState.of(self.path)
+        self.size, self.changed = now.size, now.changed
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,12 +295,17 @@ class Sequence:
     """The true positions of people; None if they are not known."""
     digest: str = field(default="")
     """A hash of sequence.toml and of size and time of every file that it names, for cache keys."""
+    stored_digest: str = field(default="")
+    """The digest of the files alone, without what was taught and is not saved, by which a moved
+    folder is recognised."""
     detector: DetectorFile | None = None
     """The network that may be run on the pictures; it is not part of :attr:`digest`."""
     warnings: tuple[str, ...] = ()
     """Sentences on problems that do not prevent tracking."""
     files: tuple[FileState, ...] = ()
     """Every file that sequence.toml names, in its state on opening."""
+    own_file: FileState | None = None
+    """The state of sequence.toml itself; None if the sequence was not read from a folder."""
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -310,7 +324,8 @@ class Sequence:
 
     def changed_files(self) -> tuple[Path, ...]:
         """Return the files that changed or vanished since the sequence was opened."""
-        return tuple(file.path for file in self.files if not file.is_same)
+        own = () if self.own_file is None else (self.own_file,)
+        return tuple(file.path for file in (*own, *self.files) if not file.is_same)
 
     @property
     def step_time(self) -> float:

@@ -333,7 +333,7 @@ function entrances({ room: { entrances } }) {
 }
 
 /** @param {Server.Taught} taught */
-function saving({ unsaved, file, read_only: why, built_in, copy_to: copy }) {
+function saving({ unsaved, file, read_only: why, remark, built_in, copy_to: copy }) {
 	const words = unsaved.join("; ");
 	return h(
 		"div.saving",
@@ -346,7 +346,8 @@ function saving({ unsaved, file, read_only: why, built_in, copy_to: copy }) {
 						h("b", `${unsaved.length} change${unsaved.length > 1 ? "s" : ""} not saved`),
 						h("span.words.cut", { title: words }, words),
 					]
-				: quiet("All is as the file has it."),
+				: !remark && quiet("All is as the file has it."),
+			remark && [h("span.dot.warn"), h("span.words", remark)],
 			h("span.grow"),
 			unsaved.length > 0 && send("Discard", "discard_taught"),
 			unsaved.length > 0 &&

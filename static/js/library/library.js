@@ -1,7 +1,7 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
 import { claim, capture, all, fill, h, icon, write } from "../elements/dom.js";
 import { asks, chooser, grow, paneHead } from "../elements/drawn.js";
-import { getJson } from "../state/api.js";
+import { ApiError, getJson, sendJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
 import { preview } from "./preview.js";
 import { runsTable } from "./runs.js";
@@ -11,14 +11,13 @@ import { factsOf, has, many, size, titleOf, when, whereabouts } from "./words.js
    where it is now. */
 
 /**
- * @param {object} how
- * @param {Actions} how.actions
- * @param {(recording: Server.RecordingInfo) => void} how.moved
+ * @param {(recording: Server.RecordingInfo) => void} moved
  */
-function lostRecording({ actions, moved }) {
+function lostRecording(moved) {
 	/** @type {Server.RecordingInfo | null} */
 	let now = null;
 	const why = h("span.cut");
+	const refused = h("p", { role: "alert", hidden: true });
 	const place = h("input.field", {
 		placeholder: "folder where it lies now",
 		"aria-label": "Folder where the recording lies now",
@@ -30,23 +29,36 @@ function lostRecording({ actions, moved }) {
 		why,
 		place,
 		h("button.btn.box", { onclick: () => void find() }, "Find…"),
+		refused,
 	);
+
+	/** Where somebody looks who has just pressed the button. @param {string} words */
+	function complain(words) {
+		write(refused, words);
+		refused.hidden = !words;
+	}
 
 	async function find() {
 		if (!now || now.id === null) return;
 		if (!place.value.trim()) return place.focus();
-		const told = await actions.ask("POST", `library/recordings/${now.id}/place`, {
-			place: place.value.trim(),
-		});
-		if (!told) return;
-		place.value = "";
-		moved(told);
+		const of = now.id;
+		try {
+			const body = { place: place.value.trim() };
+			const told = await sendJson("POST", `/api/library/recordings/${of}/place`, body);
+			place.value = "";
+			complain("");
+			moved(told);
+		} catch (error) {
+			if (!(error instanceof ApiError)) throw error;
+			if (now?.id === of) complain(error.message);
+		}
 	}
 
 	return {
 		element,
 		/** @param {Server.RecordingInfo | null} recording */
 		show(recording) {
+			if (recording?.id !== now?.id) complain("");
 			now = recording;
 			element.hidden = !recording?.missing || recording.id === null;
 			write(why, `${recording?.missing ?? ""}. Its runs stay readable.`);
@@ -248,12 +260,9 @@ export function mountLibrary(root, { store, actions }) {
 		tick: (run) => tick(run.id),
 	});
 	const empty = h("div.blank", { hidden: true });
-	const gone = lostRecording({
-		moved: (told) => {
-			recording = told;
-			void refresh();
-		},
-		actions,
+	const gone = lostRecording((told) => {
+		recording = told;
+		void refresh();
 	});
 	fill(
 		root,

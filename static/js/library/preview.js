@@ -21,6 +21,13 @@ export function preview({ store, actions }, written) {
 		if (now) written(now, /** @type {HTMLInputElement} */ (target).value);
 	});
 
+	/** What is said of a stored run holds as long as it is shown. */
+	let kept = store.get().run?.kept;
+	store.on(["run"], ({ run }) => {
+		if (run?.kept !== kept) actions.accepted(`run ${kept}`);
+		kept = run?.kept;
+	});
+
 	/** Show it in the workbench as it was. @param {Server.KeptRunInfo} run */
 	async function open(run) {
 		const state = await actions.openRun(run.id, run.recording_name);
@@ -34,6 +41,7 @@ export function preview({ store, actions }, written) {
 				? "Another version of the program, or another state of the recording, made it."
 				: "Its tracks were kept; what the cameras found comes back by computing again.",
 			{ word: "Compute again", act: actions.runAgain },
+			`run ${run.id}`,
 		);
 	}
 

@@ -639,7 +639,9 @@ declare namespace Server {
 		unit: "m" | "cm" | "mm" | number | null;
 		/** Axis of the calibration's world that points up. */
 		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
-		/** Direction of R and t. */
+		/**
+		 * What R and t map: points of the world to the camera, or points of the camera to the world.
+		 */
 		pose: "world-to-camera" | "camera-to-world" | null;
 		/** Axes of a camera: y down and z ahead, or y up and z back. */
 		axes: "opencv" | "opengl" | null;
@@ -1454,6 +1456,8 @@ declare namespace Server {
 		file: string;
 		/** Why it can only be saved as a copy; null where it can be saved. */
 		read_only: string | null;
+		/** That its file is not as it was when it was opened or saved; null where it is. */
+		remark: string | null;
 		built_in: boolean;
 		/** A folder that is not there yet, to be offered for a copy. */
 		copy_to: string;

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.app.conftest import Runs
 from tests.library.runs import RECORDING, filled, made_by_the_version_before
 from tests.library.runs import run as made
+from tracker.export.reading import read_tracks
 from tracker.library.store import Library
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
@@ -95,6 +98,35 @@ def test_a_kept_run_is_exported_as_track_writes_it(
     line = ["runs", "export", "1", "-o", folder, "--format", "motchallenge", "--library", path]
     assert run(*line)[0] == 0
     assert list(folder.rglob("gt.txt")) != []
+
+
+def test_tracks_leave_without_the_folder_of_their_recording(
+    run: Runs, path: Path, tmp_path: Path
+) -> None:
+    gone = tmp_path / "gone"
+    with Library(path) as library:
+        library.keep(replace(RECORDING, place=str(gone), kind="folder"), made(1))
+        positions = library.result(1).kept.tracks.positions
+    for name in ("a.csv", "a.json", "a.parquet", "a.trc"):
+        status, _, err = run("runs", "export", "1", "-o", tmp_path / name, "--library", path)
+        assert status == 0, err
+    for name in ("a.csv", "a.json", "a.parquet"):
+        found = read_tracks(tmp_path / name)
+        np.testing.assert_allclose(found.positions, positions, atol=1e-4)
+        assert found.boxes == {}
+    assert "the recording was not in" in (tmp_path / "a.csv").read_text(encoding="utf-8")
+    assert (tmp_path / "a.trc").read_text(encoding="ascii").count("\n") == 46
+    for line in (
+        ["bundle", "1", "-o", tmp_path / "a.zip"],
+        ["runs", "export", "1", "-o", tmp_path / "a.html"],
+        ["runs", "export", "1", "-o", tmp_path / "a.mp4"],
+        ["runs", "export", "1", "-o", tmp_path / "a.glb"],
+        ["runs", "export", "1", "-o", tmp_path / "mot", "--format", "motchallenge"],
+    ):
+        status, _, err = run(*line, "--library", path)
+        assert status == 1
+        assert f"in {gone} any more" in err
+        assert "Library and name its new folder under Find…" in err
 
 
 def test_a_run_is_not_exported_under_an_unknown_ending(

@@ -366,6 +366,22 @@ def test_a_copy_whose_corrections_cannot_be_written_says_so(
     assert len(read_log(walkers / "corrections.toml")) == 1
 
 
+def test_a_file_that_another_program_changed_is_told(client: TestClient, walkers: Path) -> None:
+    file = walkers / FILE
+    assert panel(client)["remark"] is None
+    command(client, "set_room_face", side="max", axis=0, value=1.3)
+    command(client, "save_taught")
+    command(client, "set_room_face", side="max", axis=0, value=1.4)
+    assert panel(client)["remark"] is None, "the page itself has saved it"
+    assert done(client)["run"]["warnings"] == []
+    file.write_text(file.read_text("utf-8") + "# by hand\n", "utf-8")
+    assert "was changed by another program: open the" in panel(client)["remark"]
+    command(client, "set_room_face", side="max", axis=0, value=1.5)
+    assert "sequence.toml changed or vanished" in done(client)["run"]["warnings"][0]
+    file.rename(walkers / "away")
+    assert panel(client)["remark"] == f"{file} is not there any more: put it back."
+
+
 def test_a_rendered_room_is_offered_as_a_copy(
     client: TestClient, walkers: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

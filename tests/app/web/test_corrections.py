@@ -80,6 +80,34 @@ def settled(client: TestClient) -> dict[str, Any]:
     return answer
 
 
+def test_in_a_folder_that_is_gone_nothing_is_corrected_and_nothing_is_lost(
+    desk: TestClient, own: Path
+) -> None:
+    one = max(tracks(desk), key=lambda life: life["last"] - life["first"])
+    wish = {"kind": "name", "step": one["first"] + 9, "tracks": [one["id"]], "name": "Anna"}
+    assert command(desk, "correct", corrections=[wish]).status_code == 204
+    before = desk.get(PLACE).json()["corrections"]
+    assert len(before) == 1
+    elsewhere = own.with_name("elsewhere")
+    own.rename(elsewhere)
+    assert [c["id"] for c in desk.get(PLACE).json()["corrections"]] == [before[0]["id"]]
+    for name, fields in (
+        ("correct", {"corrections": [wish | {"name": "Bo"}]}),
+        ("undo", {}),
+        ("save_taught", {}),
+    ):
+        answer = command(desk, name, **fields)
+        assert answer.status_code in (409, 422), name
+        assert f"{own} is not there any more" in answer.json()["detail"]
+    assert [c["id"] for c in desk.get(PLACE).json()["corrections"]] == [before[0]["id"]]
+    assert not own_place(own).exists()
+    assert not own.exists()
+    elsewhere.rename(own)
+    wish["name"] = "Bo"
+    assert command(desk, "correct", corrections=[wish]).status_code == 204
+    assert [c.name for c in read_log(own / "corrections.toml")] == ["Anna", "Bo"]
+
+
 @pytest.mark.full
 def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: Path) -> None:
     before = tracks(desk)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,11 @@ from app.web.dependencies import Settings
 from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, is_evaluated, run_is, wait_until
 from tests.library.runs import made_by_the_version_before
+from tests.library.runs import run as made
 from tracker.library.errors import LibraryError
+from tracker.library.keeping import record_of_recording
 from tracker.library.store import Library
+from tracker.sequences.reader import read_sequence
 
 P_D = "fusion.detection_probability"
 
@@ -136,6 +140,48 @@ def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_p
         shown = client.post(f"/api/library/runs/{number}/open").json()
         wait_until(lambda: client.get("/api/state").json()["run"]["kept"] == number)
         assert "detail" not in shown
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("saved", [False, True])
+def test_a_recording_is_found_again_after_its_room_was_edited(
+    data: Path, path: Path, tmp_path: Path, saved: bool
+) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    shutil.copytree(data / "crossing", before)
+    with application(data, path, str(before)) as client:
+        wait_until(run_is(client, "done"))
+        (recording,) = [
+            r for r in client.get("/api/library").json()["recordings"] if r["place"] == str(before)
+        ]
+        address = f"/api/library/recordings/{recording['id']}"
+        face = {"side": "max", "axis": 1, "value": 2.5}
+        assert command(client, "set_room_face", **face).status_code == 204
+        if saved:
+            assert command(client, "save_taught").status_code == 204
+            assert command(client, "set_room_face", **face | {"value": 2.25}).status_code == 204
+        wait_until(run_is(client, "done"))
+        wait_until(lambda: client.get(f"{address}/runs").json()["runs"] != [])
+        key = client.get("/api/state").json()["run"]["key"]
+        with Library(path) as library:
+            wait_until(lambda: library.with_key(key) is not None)
+            library._connection.execute("DELETE FROM runs WHERE key != ?", (key,))
+        before.rename(after)
+        told = client.post(f"{address}/place", json={"place": str(after)})
+        assert told.status_code == 200, told.text
+
+
+def test_the_digest_of_a_run_tells_its_recording(data: Path, path: Path, tmp_path: Path) -> None:
+    """An earlier version stored that of a state that was not saved with the recording."""
+    after = tmp_path / "after"
+    shutil.copytree(data / "crossing", after)
+    opened = read_sequence(after)
+    gone = replace(record_of_recording(opened, ""), place=str(tmp_path / "gone"), digest="edited")
+    with Library(path) as library:
+        library.keep(gone, made(1, digest=opened.digest))
+    with application(data, path, None) as client:
+        told = client.post("/api/library/recordings/1/place", json={"place": str(after)})
+        assert told.status_code == 200, told.text
 
 
 @pytest.mark.full
@@ -342,6 +388,11 @@ def test_runs_stay_when_the_recording_is_gone(kept: TestClient, data: Path, path
     answer = kept.post(f"/api/library/runs/{number}/open")
     assert answer.status_code == 422
     assert kept.get(f"/api/library/runs/{number}").status_code == 200
+    for form, state in (("csv", "done"), ("html", "failed")):
+        assert kept.post("/api/exports", json={"format": form, "run": number}).status_code == 200
+        wait_until(lambda: kept.get("/api/exports").json()["state"] != "writing")
+        assert kept.get("/api/exports").json()["state"] == state
+    assert "under Find…" in kept.get("/api/exports").json()["error"]
 
 
 def test_a_damaged_library_is_told_and_the_workbench_goes_on(data: Path, path: Path) -> None:

@@ -184,9 +184,39 @@ def test_a_run_is_opened_as_it_was_without_computing(library: Page, server: Serv
     expect(library.get_by_text("is shown as it was")).to_be_visible()
     state = server.get("/api/state").json()
     assert (state["run"]["kept"], state["parameters"][P_D]) == (1, 0.95)
+    ask(server, "POST", "library/runs/2/open")
+    # before it would go by itself
+    expect(library.get_by_text("is shown as it was")).to_have_count(0, timeout=2000)
+    ask(server, "POST", "library/runs/1/open")
+    server.wait(lambda state: state["run"]["kept"] == 1)
+    library.get_by_role("link", name="Library").click()
+    library.locator('tr[data-run="1"]').click()
+    library.get_by_role("button", name="Open in Tune").click()
     library.get_by_role("button", name="Compute again").click()
     state = server.wait(lambda state: state["run"]["kept"] is None)
     server.wait_for_run()
+
+
+def test_a_folder_that_cannot_be_found_is_told_where_it_was_asked_for(
+    library: Page, server: Server
+) -> None:
+    folder = Path(server.get("/api/library").json()["recordings"][0]["place"])
+    moved = folder.with_name("elsewhere")
+    folder.rename(moved)
+    try:
+        library.reload()
+        place = library.get_by_role("textbox", name="Folder where the recording lies now")
+        place.fill(str(folder.with_name("nowhere")))
+        library.get_by_role("button", name="Find…").click()
+        refused = library.get_by_role("region", name="Runs").get_by_role("alert")
+        expect(refused).to_contain_text("there is no such folder")
+        expect(place).to_have_value(str(folder.with_name("nowhere")))
+    finally:
+        moved.rename(folder)
+    place.fill(str(folder))
+    library.get_by_role("button", name="Find…").click()
+    expect(place).to_be_hidden()
+    expect(refused).to_be_hidden()
 
 
 def test_a_run_is_pinned_as_a(library: Page, server: Server) -> None:

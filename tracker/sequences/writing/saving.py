@@ -20,7 +20,7 @@ import tomlkit
 from tomlkit.items import AoT
 
 from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder, write_whole
-from tracker.files.folders import cache_folder
+from tracker.files.folders import cache_folder, is_missing
 from tracker.sequences.built_in import built_in_name
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
@@ -47,6 +47,8 @@ def why_not_in_place(folder: Path) -> str | None:
         return f"{folder.name} comes with the program and is never written to"
     if folder.is_relative_to(cache_folder()):
         return f"{folder.name} lies in the cache, which may be emptied at any time"
+    if is_missing(folder):
+        return f"{folder} is not there any more"
     if not os.access(folder, os.W_OK) or not os.access(folder / FILE, os.W_OK):
         return f"{folder} is a place that you may only read"
     return None
@@ -63,16 +65,19 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         The path of the backup.
 
     Raises:
-        SequenceError: If the file may not be written, or its room, target or templates were
-            changed meanwhile by another program; it is then unchanged.
+        SequenceError: If the folder is gone, the file may not be written, or its room, target or
+            templates were changed meanwhile by another program; it is then unchanged.
     """
     folder, where = sequence.folder, f"{sequence.folder.name}/{FILE}"
+    _check_there(folder, where)
     reason = why_not_in_place(folder)
     if reason is not None:
         raise SequenceError(f"{where}: cannot be saved, since {reason}; save a copy")
     with _complaining(folder / FILE):
         check_own_file(folder)  # it may have become a link since it was read
         path = (folder / FILE).resolve()
+        # what another program wrote there since is still to be noticed afterwards
+        own = saved.own_file if saved.own_file is not None and saved.own_file.is_same else None
         before = path.read_bytes()
         text = rewritten(before.decode("utf-8-sig"), saved, sequence, where)
         backup = _keep(folder, before)
@@ -84,6 +89,8 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         except BaseException:
             backup.unlink(missing_ok=True)  # of a file that is as it was
             raise
+        if own is not None:
+            own.renew()
     return backup
 
 
@@ -106,6 +113,7 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
     """
     source, built_in = sequence.folder, built_in_name(sequence.folder) is not None
     folder = given_folder(folder).absolute()
+    _check_there(source, f"{source.name}/{FILE}")
     _check_place(folder, source)
     with _complaining(folder):
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -134,6 +142,19 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
             shutil.rmtree(building, ignore_errors=True)
             raise
     return read_sequence(folder)
+
+
+def _check_there(folder: Path, where: str) -> None:
+    """Check that the folder of a sequence still exists, before anything is written.
+
+    Raises:
+        SequenceError: If it was moved or deleted.
+    """
+    if is_missing(folder):
+        raise SequenceError(
+            f"{where}: cannot be saved, since {folder} is not there any more; put the folder back, "
+            "then save again"
+        )
 
 
 def _check_place(folder: Path, source: Path) -> None:
