@@ -38,7 +38,16 @@ from tracker.parameters.values import ParameterError, with_values
 from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.batches import BatchRun, places_of, run_batch
 from tracker.studies.errors import StudyError
-from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
+from tracker.studies.store import (
+    Status,
+    Store,
+    Trial,
+    create,
+    find,
+    free_name,
+    stores,
+    studies_folder,
+)
 from tracker.studies.tuning import tuning
 
 if TYPE_CHECKING:
@@ -471,7 +480,8 @@ def tune(command: Tune) -> int:
         raise ParameterError("RECORDING …", "expected at least one recording")
     changes = set_values(command.set)
     with_values(RunParameters(), changes)  # wrong usage shows before any work
-    name = f"tune {Path(command.recordings[0]).name} {time.strftime('%Y-%m-%d %H.%M.%S')}"
+    folder = command.studies or studies_folder()
+    name = free_name(f"tune {os.path.basename(os.path.abspath(command.recordings[0]))}", folder)
     definition = tuning(
         name,
         command.recordings,
@@ -482,7 +492,7 @@ def tune(command: Tune) -> int:
     blind = definition.objectives == ("identity",)
     if blind:
         say(f"no truth is looked at: the score without truth is what counts. {WARNING}")
-    store = create(definition, command.studies or studies_folder())
+    store = create(definition, folder)
     status = run(store, command, quiet=True)
     if status == INTERRUPTED:
         say(f"stopped; `multiview-phd study resume {name!r}` goes on")

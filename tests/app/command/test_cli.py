@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from app.command import listing
+from app.command import listing, studies
 from app.command import main as cli
 from app.command.flags import Track, parse
 from app.command.terminal import rate
@@ -505,3 +505,12 @@ def test_an_option_given_twice_loses_neither(
     given = [word for one in values for word in (f"--{option}", one)]
     command: Any = parse([*line, *given])
     assert getattr(getattr(command, "action", command), option) == values
+
+
+def test_a_recording_of_any_name_is_tuned(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(crossing, recording := tmp_path / "Hall (north) [2] & yard")
+    monkeypatch.setattr(studies, "run", lambda *_, **__: studies.INTERRUPTED)
+    status, _, stderr = run("tune", f"{recording}/", "--studies", tmp_path / "studies")
+    assert (status, "study resume 'tune Hall -north- -2- - yard 1'" in stderr) == (130, True)
