@@ -120,12 +120,31 @@ def _new(command: NewStudy) -> None:
         raise CommandError(f"{file} exists; name a file that does not")
     if file.suffix != ".toml":
         raise CommandError(f"{file}: expected the name of a .toml file")
-    recordings = command.recording or ("room44-3p",)
+    recordings = [_from_file(file, name) for name in command.recording] or ["room44-3p"]
     objective = "score" if _have_truth(recordings, file.parent) else "identity"
     text = example(file.stem, recordings, objective=objective)
     with replacing(file) as begun:
         begun.write_text(text, encoding="utf-8")
     say(f"{file} is written: change it, then `multiview-phd study run {shlex.quote(str(file))}`")
+
+
+def _from_file(file: Path, name: str) -> str:
+    """Return what a study's file calls a recording: its relative paths refer to its own folder."""
+    from tracker.sequences.library import is_room
+    from tracker.studies.definition import places_of
+
+    if is_room(name) or os.path.isabs(os.path.expanduser(name)):
+        return name
+    try:
+        places_of([name], Path.cwd())
+    except StudyError:
+        return name  # it may be there as seen from the file, or is still to come
+    place = Path(os.path.abspath(name))
+    place, folder = Path(os.path.realpath(place.parent), place.name), file.parent.resolve()
+    if not place.is_relative_to(folder.parent):
+        return str(place)
+    relative = Path(os.path.relpath(place, folder)).as_posix()
+    return f"./{relative}" if is_room(relative) else relative
 
 
 @contextmanager

@@ -28,6 +28,7 @@ from tracker.parameters.values import ParameterError, value_of, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
+from tracker.studies.definition import read_definition
 
 P_D = "fusion.detection_probability"
 
@@ -484,6 +485,32 @@ def test_a_new_study_seeks_what_its_recording_can_tell(
         study = tmp_path / f"{objective}-{Path(recording).name}.toml"
         assert run("study", "new", study, "--recording", recording)[0] == 0
         assert f'objectives = ["{objective}"]' in study.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("Data/x", "../Data/x"),
+        ("./Data/*/", "../Data/*"),
+        ("studies/y", "y"),
+        ("studies/room44-3p", "./room44-3p"),
+        ("../far/z", "{parent}/far/z"),
+        ("room44-3p", "room44-3p"),
+        ("absent", "absent"),
+    ],
+)
+def test_a_new_study_names_its_recording_as_seen_from_its_file(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, written: str
+) -> None:
+    home = tmp_path / "home"
+    for place in ("Data/x", "studies/y", "studies/room44-3p", "../far/z"):
+        write_crossing(home / place, frames=2)
+    monkeypatch.chdir(home)
+    assert run("study", "new", "studies/s.toml", "--recording", name)[0] == 0
+    text = (home / "studies" / "s.toml").read_text(encoding="utf-8")
+    assert f'recordings = ["{written.format(parent=tmp_path)}"]' in text
+    if name != "absent":
+        read_definition(Path("studies/s.toml"))
 
 
 @pytest.mark.parametrize(
