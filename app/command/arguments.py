@@ -333,7 +333,7 @@ class Batch(Where):
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: robust)")] = (
         None
     )
-    """Named values to start from."""
+    """Named values to start from: those of a built-in preset, or of one of your own."""
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98."""
     seeds: FromOne = 1

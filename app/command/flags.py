@@ -55,7 +55,7 @@ from app.command.arguments import (
 from app.command.terminal import say
 from app.command.typed import WrongValue, flag_of, limited, registry
 from tracker import __version__
-from tracker.files.folders import MOST_GB
+from tracker.files.folders import MOST_GB, settings_folder
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
     DEFAULT_RULE,
@@ -111,11 +111,20 @@ def preset_values(name: str | None) -> dict[str, Any]:
     """The values of ``--preset`` by key; none where none is named.
 
     Raises:
-        ParameterError: If there is no such preset.
+        ParameterError: If it is neither a built-in preset nor one of the user's own.
+        ValueError: If the file with the user's own presets is not as it was written.
     """
-    if name is not None and name not in PRESETS:
-        raise ParameterError("--preset", f"expected one of {', '.join(PRESETS)}, got {name!r}")
-    return {} if name is None else dict(PRESETS[name])
+    if name is None or name in PRESETS:
+        return {} if name is None else dict(PRESETS[name])
+    from app.state.presets import stored_presets  # brings the engine
+
+    own = stored_presets(settings_folder() / "presets.json")
+    if name not in own:
+        known = ", ".join((*PRESETS, *own))
+        raise ParameterError("--preset", f"expected one of {known}, got {name!r}")
+    for sentence in removed_notes(own[name]):
+        say(sentence)
+    return own[name]
 
 
 @dataclass
@@ -193,9 +202,10 @@ class Track:
     ] = None
     """Method of stage 3."""
     preset: Annotated[
-        str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
+        str | None,
+        arg(metavar="|".join((*PRESETS, "NAME")), help_behavior_hint="(default: robust)"),
     ] = None
-    """Named values to start from."""
+    """Named values to start from: those of a built-in preset, or of one of your own."""
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: FromZero = 0

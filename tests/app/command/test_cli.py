@@ -18,12 +18,13 @@ from app.command import listing, studies
 from app.command import main as cli
 from app.command.flags import Track, parse
 from app.command.terminal import rate
+from app.state.presets import keep_preset
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
 from tracker import __version__
 from tracker.export import tracks_csv
 from tracker.kernels import compilation
-from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, REMOVED, RunParameters
 from tracker.parameters.values import ParameterError, value_of, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
@@ -169,7 +170,7 @@ def test_help_names_every_flag_with_range_and_default(run: Runs) -> None:
         (["--set", "fusion.survival_probability"], "--set: expected KEY=VALUE"),
         (["--fusion.survival-probability", "2"], "must be between 0.5 and 1, got 2"),
         (["--fusion.survival-probability", "much"], "expected a number, got 'much'"),
-        (["--preset", "magic"], "--preset: expected one of robust, published, got 'magic'"),
+        (["--preset", "magic"], "--preset: expected one of robust, published"),
         (["--fusion", "magic"], "expected one of sequential_phd"),
         (["--single-view", "magic"], "expected one of colour_phd"),
         (["--seed", "-1"], "--seed: expected a whole number from 0, got -1"),
@@ -411,6 +412,35 @@ def test_changes_of_a_flag_beat_those_of_a_preset() -> None:
     assert command.changes()[key] == str(other)
     with pytest.raises(ParameterError):
         Track(sequence="r", output=Path("x"), preset="magic").changes()
+
+
+def test_presets_of_ones_own_are_taken_by_name(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path))
+    values = {P_D: 0.9, "fusion.recognition_doubt": 0.25}
+    keep_preset(tmp_path / "presets.json", "tuned", values)
+    keep_preset(tmp_path / "presets.json", "other", {"fusion.process_noise": 0.1})
+    current = {P_D: 0.9, "fusion.recognition_outlier_probability": 0.25}
+    command = parse(["track", "r", "-o", "x", "--preset", "tuned"])
+    assert command.changes() == current
+    taken: list[Any] = []
+    monkeypatch.setattr(
+        studies, "run_batch", lambda _, changes, *__, **___: taken.append(changes) or []
+    )
+    run("batch", crossing, "--preset", "tuned", "--library", tmp_path / "library.sqlite3")
+    assert taken == [current]
+    status, _, stderr = run("batch", crossing, "--preset", "magic")
+    assert status == 2
+    assert "--preset: expected one of robust, published, tuned, other, got 'magic'" in stderr
+    gone = next(iter(REMOVED))
+    keep_preset(tmp_path / "presets.json", "tuned", {P_D: 0.9, gone: 1.0})
+    with_values(RunParameters(), command.changes())
+    _, _, stderr = run("batch", crossing, "--preset", "tuned", "--set", "fusion.nothing=1")
+    assert f"{gone} no longer exists" in stderr
+    (tmp_path / "presets.json").write_text('{"tuned": 3}')
+    _, _, stderr = run("batch", crossing, "--preset", "tuned")
+    assert f"{tmp_path / 'presets.json'}: tuned: expected an object, found 3" in stderr
 
 
 def test_help_is_there_at_once_and_without_the_engine() -> None:
