@@ -428,7 +428,7 @@ def batch(command: Batch) -> int:
     """Track them all; returns the exit status: 1 where one could not be tracked.
 
     Raises:
-        StudyError: If a name stands for nothing, or the workers cannot work on.
+        StudyError: If a list of recordings cannot be read, or the workers cannot work on.
     """
     changes = {**preset_values(command.preset), **set_values(command.set)}
     with_values(RunParameters(), changes)  # wrong usage shows before any work
@@ -477,8 +477,9 @@ def _print_batch(places: Sequence[str], found: Sequence[BatchRun]) -> None:
          "kept as", ""),
         rows,
     )  # fmt: skip
-    computed = sum(one.computed for one in found)
-    say(f"{len(found)} runs, {computed} of them computed now; `multiview-phd runs` lists them")
+    stored = [one.computed for one in found if one.run is not None]
+    say(f"{len(stored)} of {len(found)} runs stored, {sum(stored)} of them computed now; "
+        "`multiview-phd runs` lists them")  # fmt: skip
 
 
 def _mean(values: Sequence[float | None], shown: Callable[[float], str] = "{:.3f}".format) -> str:

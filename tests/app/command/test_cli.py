@@ -443,6 +443,19 @@ def test_presets_of_ones_own_are_taken_by_name(
     assert f"{tmp_path / 'presets.json'}: tuned: expected an object, found 3" in stderr
 
 
+@pytest.mark.full
+def test_a_batch_goes_on_without_a_recording_that_is_missing(
+    run: Runs, crossing: Path, tmp_path: Path
+) -> None:
+    line = ("batch", "absent", crossing, "--workers", 1, "--library", tmp_path / "library.sqlite3")
+    status, stdout, stderr = run(*line)
+    assert status == 1
+    _, missing, done = stdout.splitlines()
+    assert re.fullmatch(r"absent +0 .*there is no sequence \"absent\": expected .*", missing)
+    assert re.match(r"crossing +1 ", done)
+    assert "1 of 2 runs stored, 1 of them computed now" in stderr
+
+
 def test_help_is_there_at_once_and_without_the_engine() -> None:
     script = (
         "import sys; from app.command import main as cli\n"
