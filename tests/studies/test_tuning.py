@@ -137,6 +137,23 @@ def test_a_built_in_room_is_tuned_though_a_folder_of_its_name_is_there(
         assert tuning("t", [name], minutes=1.0, changes={}).recordings == (place,)
 
 
+def test_speeds_are_not_compared_since_the_first_run_has_the_start_of_the_program(
+    tmp_path: Path,
+) -> None:
+    def do(job: Job) -> Outcome:
+        found = outcome(job, 0.9 - 0.1 * abs(of(job, "fusion.detection_probability") - 0.7))
+        found.figures["speed"] = 100.0 if job.values else 8.0
+        return found
+
+    store = study(tmp_path)
+    run(store, Serial(do))
+    compared = {
+        row["key"]: (row["default"], row["after"]) for row in store.fact("tuned")["figures"]
+    }
+    assert list(compared) == ["score", "hota", "idf1"]
+    assert compared["score"][0] < compared["score"][1]
+
+
 @pytest.mark.parametrize(
     ("words", "plain"),
     [
