@@ -264,8 +264,8 @@ class Evaluate:
         arg(
             metavar="TRACKS",
             help="As `track` and the page write them: CSV, JSON, Parquet, TRC, or MOTChallenge's "
-            "ground plane (.txt). Without one no truth is needed: the sequence is tracked forward, "
-            "backwards and without each camera.",
+            "folder or its ground plane (.txt). Without one no truth is needed: the sequence is "
+            "tracked forward, backwards and without each camera.",
             help_behavior_hint="(optional)",
         ),
     ] = None
