@@ -38,16 +38,20 @@ from app.command.arguments import (
     FormatName,
     Formats,
     FromZero,
+    FusionMethod,
     Import,
     LibraryCommand,
     LibraryFile,
     LogFile,
     Parameters,
     Port,
+    PresetName,
     Runs,
     SequenceName,
     Sequences,
     SetValues,
+    SingleView,
+    SmoothingMethod,
     Study,
     Templates,
     Tune,
@@ -58,7 +62,6 @@ from tracker import __version__
 from tracker.files.folders import MOST_GB, settings_folder
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
-    DEFAULT_RULE,
     GROUPS,
     METHODS,
     PARAMETERS,
@@ -66,7 +69,6 @@ from tracker.parameters.catalogue import (
     REMOVED,
     RENAMED,
     Parameter,
-    RunParameters,
 )
 from tracker.parameters.values import ParameterError, current_key, removed_notes
 
@@ -127,6 +129,21 @@ def preset_values(name: str | None) -> dict[str, Any]:
     return own[name]
 
 
+def changes_of(command: Track | Batch, flags: Iterable[str] = METHODS) -> dict[str, Any]:
+    """The values that a command asks for, by key: preset, then ``--set``, then flags.
+
+    Args:
+        command: The command.
+        flags: Keys that have a flag of their own.
+
+    Raises:
+        ParameterError: If the preset or a ``--set`` is not as it must be.
+    """
+    changes: dict[str, Any] = {**preset_values(command.preset), **set_values(command.set)}
+    given = {key: operator.attrgetter(key)(command) for key in flags}
+    return changes | {key: value for key, value in given.items() if value is not None}
+
+
 @dataclass
 class Serve:
     """Start the workbench and serve its page on this machine."""
@@ -178,34 +195,10 @@ class Track:
     """The file to write. It appears when it is complete."""
     format: FormatName = None
     """The form of the file; `runs export` lists them."""
-    single_view: Annotated[
-        str | None,
-        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({DEFAULT_RULE})"),
-    ] = None
-    """Method of stage 1."""
-    fusion_method: Annotated[
-        str | None,
-        arg(
-            name="fusion",
-            metavar="|".join(METHODS["fusion_method"]),
-            help_behavior_hint=f"(default: {RunParameters().fusion_method})",
-        ),
-    ] = None
-    """Method of stage 2."""
-    smoothing_method: Annotated[
-        str | None,
-        arg(
-            name="smoothing",
-            metavar="|".join(METHODS["smoothing_method"]),
-            help_behavior_hint=f"(default: {RunParameters().smoothing_method})",
-        ),
-    ] = None
-    """Method of stage 3."""
-    preset: Annotated[
-        str | None,
-        arg(metavar="|".join((*PRESETS, "NAME")), help_behavior_hint="(default: robust)"),
-    ] = None
-    """Named values to start from: those of a built-in preset, or of one of your own."""
+    single_view: SingleView = None
+    fusion_method: FusionMethod = None
+    smoothing_method: SmoothingMethod = None
+    preset: PresetName = None
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: FromZero = 0
@@ -229,14 +222,8 @@ class Track:
     none."""
 
     def changes(self) -> dict[str, Any]:
-        """The values asked for, by key: preset, then ``--set``, then flags.
-
-        Raises:
-            ParameterError: If the preset or a ``--set`` is not as it must be.
-        """
-        changes: dict[str, Any] = {**preset_values(self.preset), **set_values(self.set)}
-        given = {key: operator.attrgetter(key)(self) for key in (*METHODS, *PARAMETERS)}
-        return changes | {key: value for key, value in given.items() if value is not None}
+        """The values asked for, by key."""
+        return changes_of(self, (*METHODS, *PARAMETERS))
 
 
 @dataclass

@@ -29,7 +29,7 @@ from app.command.arguments import (
     Tune,
     Where,
 )
-from app.command.flags import preset_values, set_values
+from app.command.flags import changes_of, set_values
 from app.command.terminal import FAILURE, Bar, CommandError, print_json, print_table, rate, say
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
@@ -430,7 +430,7 @@ def batch(command: Batch) -> int:
     Raises:
         StudyError: If a list of recordings cannot be read, or the workers cannot work on.
     """
-    changes = {**preset_values(command.preset), **set_values(command.set)}
+    changes = changes_of(command)
     with_values(RunParameters(), changes)  # wrong usage shows before any work
     places = places_of(command.recordings)
     with (

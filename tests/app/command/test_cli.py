@@ -443,6 +443,24 @@ def test_presets_of_ones_own_are_taken_by_name(
     assert f"{tmp_path / 'presets.json'}: tuned: expected an object, found 3" in stderr
 
 
+def test_a_batch_takes_the_methods_as_track_does(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[Any] = []
+    monkeypatch.setattr(
+        studies, "run_batch", lambda _, changes, *__, **___: taken.append(changes) or []
+    )
+    flags = ["--single-view", "jpda", "--fusion", "sequential_phd", "--smoothing", "none"]
+    flags += ["--set", "fusion_method=association_matrix"]
+    assert run("batch", crossing, *flags, "--library", tmp_path / "library.sqlite3")[0] == 0
+    assert taken == [parse(["track", "r", "-o", "x", *flags]).changes()]
+    assert taken[0] == {
+        "fusion_method": "sequential_phd", "single_view": "jpda", "smoothing_method": "none",
+    }  # fmt: skip
+    status, _, stderr = run("batch", crossing, "--fusion", "magic")
+    assert (status, "expected one of" in stderr) == (2, True)
+
+
 @pytest.mark.full
 def test_a_batch_goes_on_without_a_recording_that_is_missing(
     run: Runs, crossing: Path, tmp_path: Path
