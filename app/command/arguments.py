@@ -19,6 +19,7 @@ from tyro.conf import (
 from app.command.typed import limited, reader_of
 from app.messages import Marks, VideoPart
 from tracker.library import KEEP
+from tracker.parameters.catalogue import DEFAULT_RULE, METHODS, PRESETS, RunParameters
 
 SequenceName = Annotated[
     Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
@@ -26,6 +27,41 @@ SequenceName = Annotated[
 
 SetValues = Annotated[
     UseAppendAction[tuple[str, ...]], arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)")
+]
+
+SingleView = Annotated[
+    str | None,
+    arg(
+        metavar="|".join(METHODS["single_view"]),
+        help="Method of stage 1.",
+        help_behavior_hint=f"({DEFAULT_RULE})",
+    ),
+]
+FusionMethod = Annotated[
+    str | None,
+    arg(
+        name="fusion",
+        metavar="|".join(METHODS["fusion_method"]),
+        help="Method of stage 2.",
+        help_behavior_hint=f"(default: {RunParameters().fusion_method})",
+    ),
+]
+SmoothingMethod = Annotated[
+    str | None,
+    arg(
+        name="smoothing",
+        metavar="|".join(METHODS["smoothing_method"]),
+        help="Method of stage 3.",
+        help_behavior_hint=f"(default: {RunParameters().smoothing_method})",
+    ),
+]
+PresetName = Annotated[
+    str | None,
+    arg(
+        metavar="|".join((*PRESETS, "NAME")),
+        help="Named values to start from: those of a built-in preset, or of one of your own.",
+        help_behavior_hint="(default: robust)",
+    ),
 ]
 
 FromZero = Annotated[int, limited(int, "a whole number from 0", 0), arg(metavar="INT")]
@@ -330,10 +366,10 @@ class Batch(Where):
             help_behavior_hint="",
         ),
     ]
-    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: robust)")] = (
-        None
-    )
-    """Named values to start from."""
+    single_view: SingleView = None
+    fusion_method: FusionMethod = None
+    smoothing_method: SmoothingMethod = None
+    preset: PresetName = None
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98."""
     seeds: FromOne = 1

@@ -38,16 +38,20 @@ from app.command.arguments import (
     FormatName,
     Formats,
     FromZero,
+    FusionMethod,
     Import,
     LibraryCommand,
     LibraryFile,
     LogFile,
     Parameters,
     Port,
+    PresetName,
     Runs,
     SequenceName,
     Sequences,
     SetValues,
+    SingleView,
+    SmoothingMethod,
     Study,
     Templates,
     Tune,
@@ -55,10 +59,9 @@ from app.command.arguments import (
 from app.command.terminal import say
 from app.command.typed import WrongValue, flag_of, limited, registry
 from tracker import __version__
-from tracker.files.folders import MOST_GB
+from tracker.files.folders import MOST_GB, settings_folder
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
-    DEFAULT_RULE,
     GROUPS,
     METHODS,
     PARAMETERS,
@@ -66,7 +69,6 @@ from tracker.parameters.catalogue import (
     REMOVED,
     RENAMED,
     Parameter,
-    RunParameters,
 )
 from tracker.parameters.values import ParameterError, current_key, removed_notes
 
@@ -111,11 +113,35 @@ def preset_values(name: str | None) -> dict[str, Any]:
     """The values of ``--preset`` by key; none where none is named.
 
     Raises:
-        ParameterError: If there is no such preset.
+        ParameterError: If it is neither a built-in preset nor one of the user's own.
+        ValueError: If the file with the user's own presets is not as it was written.
     """
-    if name is not None and name not in PRESETS:
-        raise ParameterError("--preset", f"expected one of {', '.join(PRESETS)}, got {name!r}")
-    return {} if name is None else dict(PRESETS[name])
+    if name is None or name in PRESETS:
+        return {} if name is None else dict(PRESETS[name])
+    from app.state.presets import stored_presets  # brings the engine
+
+    own = stored_presets(settings_folder() / "presets.json")
+    if name not in own:
+        known = ", ".join((*PRESETS, *own))
+        raise ParameterError("--preset", f"expected one of {known}, got {name!r}")
+    for sentence in removed_notes(own[name]):
+        say(sentence)
+    return own[name]
+
+
+def changes_of(command: Track | Batch, flags: Iterable[str] = METHODS) -> dict[str, Any]:
+    """The values that a command asks for, by key: preset, then ``--set``, then flags.
+
+    Args:
+        command: The command.
+        flags: Keys that have a flag of their own.
+
+    Raises:
+        ParameterError: If the preset or a ``--set`` is not as it must be.
+    """
+    changes: dict[str, Any] = {**preset_values(command.preset), **set_values(command.set)}
+    given = {key: operator.attrgetter(key)(command) for key in flags}
+    return changes | {key: value for key, value in given.items() if value is not None}
 
 
 @dataclass
@@ -169,33 +195,10 @@ class Track:
     """The file to write. It appears when it is complete."""
     format: FormatName = None
     """The form of the file; `runs export` lists them."""
-    single_view: Annotated[
-        str | None,
-        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({DEFAULT_RULE})"),
-    ] = None
-    """Method of stage 1."""
-    fusion_method: Annotated[
-        str | None,
-        arg(
-            name="fusion",
-            metavar="|".join(METHODS["fusion_method"]),
-            help_behavior_hint=f"(default: {RunParameters().fusion_method})",
-        ),
-    ] = None
-    """Method of stage 2."""
-    smoothing_method: Annotated[
-        str | None,
-        arg(
-            name="smoothing",
-            metavar="|".join(METHODS["smoothing_method"]),
-            help_behavior_hint=f"(default: {RunParameters().smoothing_method})",
-        ),
-    ] = None
-    """Method of stage 3."""
-    preset: Annotated[
-        str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
-    ] = None
-    """Named values to start from."""
+    single_view: SingleView = None
+    fusion_method: FusionMethod = None
+    smoothing_method: SmoothingMethod = None
+    preset: PresetName = None
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
     seed: FromZero = 0
@@ -219,14 +222,8 @@ class Track:
     none."""
 
     def changes(self) -> dict[str, Any]:
-        """The values asked for, by key: preset, then ``--set``, then flags.
-
-        Raises:
-            ParameterError: If the preset or a ``--set`` is not as it must be.
-        """
-        changes: dict[str, Any] = {**preset_values(self.preset), **set_values(self.set)}
-        given = {key: operator.attrgetter(key)(self) for key in (*METHODS, *PARAMETERS)}
-        return changes | {key: value for key, value in given.items() if value is not None}
+        """The values asked for, by key."""
+        return changes_of(self, (*METHODS, *PARAMETERS))
 
 
 @dataclass
@@ -254,8 +251,8 @@ class Evaluate:
         arg(
             metavar="TRACKS",
             help="As `track` and the page write them: CSV, JSON, Parquet, TRC, or MOTChallenge's "
-            "ground plane (.txt). Without one no truth is needed: the sequence is tracked forward, "
-            "backwards and without each camera.",
+            "folder or its ground plane (.txt). Without one no truth is needed: the sequence is "
+            "tracked forward, backwards and without each camera.",
             help_behavior_hint="(optional)",
         ),
     ] = None

@@ -29,7 +29,7 @@ from app.command.arguments import (
     Tune,
     Where,
 )
-from app.command.flags import preset_values, set_values
+from app.command.flags import changes_of, set_values
 from app.command.terminal import FAILURE, Bar, CommandError, print_json, print_table, rate, say
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
@@ -38,7 +38,16 @@ from tracker.parameters.values import ParameterError, with_values
 from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.batches import BatchRun, places_of, run_batch
 from tracker.studies.errors import StudyError
-from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
+from tracker.studies.store import (
+    Status,
+    Store,
+    Trial,
+    create,
+    find,
+    free_name,
+    stores,
+    studies_folder,
+)
 from tracker.studies.tuning import tuning
 
 if TYPE_CHECKING:
@@ -111,12 +120,31 @@ def _new(command: NewStudy) -> None:
         raise CommandError(f"{file} exists; name a file that does not")
     if file.suffix != ".toml":
         raise CommandError(f"{file}: expected the name of a .toml file")
-    recordings = command.recording or ("room44-3p",)
+    recordings = [_from_file(file, name) for name in command.recording] or ["room44-3p"]
     objective = "score" if _have_truth(recordings, file.parent) else "identity"
     text = example(file.stem, recordings, objective=objective)
     with replacing(file) as begun:
         begun.write_text(text, encoding="utf-8")
     say(f"{file} is written: change it, then `multiview-phd study run {shlex.quote(str(file))}`")
+
+
+def _from_file(file: Path, name: str) -> str:
+    """Return what a study's file calls a recording: its relative paths refer to its own folder."""
+    from tracker.sequences.library import is_room
+    from tracker.studies.definition import places_of
+
+    if is_room(name) or os.path.isabs(os.path.expanduser(name)):
+        return name
+    try:
+        places_of([name], Path.cwd())
+    except StudyError:
+        return name  # it may be there as seen from the file, or is still to come
+    place = Path(os.path.abspath(name))
+    place, folder = Path(os.path.realpath(place.parent), place.name), file.parent.resolve()
+    if not place.is_relative_to(folder.parent):
+        return str(place)
+    relative = Path(os.path.relpath(place, folder)).as_posix()
+    return f"./{relative}" if is_room(relative) else relative
 
 
 @contextmanager
@@ -400,9 +428,9 @@ def batch(command: Batch) -> int:
     """Track them all; returns the exit status: 1 where one could not be tracked.
 
     Raises:
-        StudyError: If a name stands for nothing, or the workers cannot work on.
+        StudyError: If a list of recordings cannot be read, or the workers cannot work on.
     """
-    changes = {**preset_values(command.preset), **set_values(command.set)}
+    changes = changes_of(command)
     with_values(RunParameters(), changes)  # wrong usage shows before any work
     places = places_of(command.recordings)
     with (
@@ -449,8 +477,9 @@ def _print_batch(places: Sequence[str], found: Sequence[BatchRun]) -> None:
          "kept as", ""),
         rows,
     )  # fmt: skip
-    computed = sum(one.computed for one in found)
-    say(f"{len(found)} runs, {computed} of them computed now; `multiview-phd runs` lists them")
+    stored = [one.computed for one in found if one.run is not None]
+    say(f"{len(stored)} of {len(found)} runs stored, {sum(stored)} of them computed now; "
+        "`multiview-phd runs` lists them")  # fmt: skip
 
 
 def _mean(values: Sequence[float | None], shown: Callable[[float], str] = "{:.3f}".format) -> str:
@@ -471,7 +500,8 @@ def tune(command: Tune) -> int:
         raise ParameterError("RECORDING …", "expected at least one recording")
     changes = set_values(command.set)
     with_values(RunParameters(), changes)  # wrong usage shows before any work
-    name = f"tune {Path(command.recordings[0]).name} {time.strftime('%Y-%m-%d %H.%M.%S')}"
+    folder = command.studies or studies_folder()
+    name = free_name(f"tune {os.path.basename(os.path.abspath(command.recordings[0]))}", folder)
     definition = tuning(
         name,
         command.recordings,
@@ -482,7 +512,7 @@ def tune(command: Tune) -> int:
     blind = definition.objectives == ("identity",)
     if blind:
         say(f"no truth is looked at: the score without truth is what counts. {WARNING}")
-    store = create(definition, command.studies or studies_folder())
+    store = create(definition, folder)
     status = run(store, command, quiet=True)
     if status == INTERRUPTED:
         say(f"stopped; `multiview-phd study resume {name!r}` goes on")

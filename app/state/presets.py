@@ -157,8 +157,20 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
     """
     name = _checked(name)
     with locked(path):
-        presets = _stored(path) if path.is_file() else {}
-        write_json(path, {**presets, name: dict(values)})
+        write_json(path, {**stored_presets(path), name: dict(values)})
+
+
+def stored_presets(path: Path) -> dict[str, dict[str, Any]]:
+    """Return the presets of a file by name, without a workbench; none where there is no file.
+
+    Raises:
+        ValueError: If the file is not as it was written; the message names it.
+        OSError: If it cannot be read.
+    """
+    try:
+        return _stored(path) if path.is_file() else {}
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def _stored(path: Path) -> dict[str, dict[str, Any]]:

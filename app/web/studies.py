@@ -24,7 +24,7 @@ from tracker.studies.definition import StudyDefinition, definition_of
 from tracker.studies.errors import StudyError
 from tracker.studies.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, Objective, chosen
 from tracker.studies.space import Varied, around
-from tracker.studies.store import Store, Trial
+from tracker.studies.store import Store, Trial, free_name
 from tracker.studies.summary import track_commands
 from tracker.studies.tuning import tuning
 
@@ -523,7 +523,7 @@ def draft(
     wanted = None if keys is None else [key for key in keys.split(",") if key]
     has_truth = sequence.ground_truth is not None
     return StudyDraft(
-        name=_free_name(desk, sequence.name),
+        name=free_name(sequence.name, desk.folder),
         recordings=[place_of(sequence.folder)],
         has_truth=has_truth,
         parameters=ranges_of(snapshot, wanted),
@@ -534,13 +534,6 @@ def draft(
         workers=available_cores(),
         words=_left_out(snapshot),
     )
-
-
-def _free_name(desk: StudyDesk, name: str) -> str:
-    plain = "".join(c if c.isalnum() or c in " .+-_" else "-" for c in name)[:50].strip(" .+-_")
-    taken = {store.name for store in desk.all()}
-    number = next(n for n in range(1, len(taken) + 2) if f"{plain or 'study'} {n}" not in taken)
-    return f"{plain or 'study'} {number}"
 
 
 def _left_out(snapshot: Snapshot) -> str:
@@ -658,7 +651,7 @@ def tune(wish: TuneWish, desk: Desk, bench: Bench) -> Study:
     snapshot, sequence = opened(bench)
     desk.check_place(wish.workers, wish.scheduler)
     definition = tuning(
-        _free_name(desk, f"tune {sequence.name}"),
+        free_name(f"tune {sequence.name}", desk.folder),
         [place_of(sequence.folder)],
         minutes=wish.minutes,
         changes=changed_values(snapshot.parameters, snapshot.defaults),

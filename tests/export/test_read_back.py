@@ -17,6 +17,7 @@ from tracker.export.exported_run import ExportedRun
 from tracker.export.reading import read_tracks
 from tracker.export.registry import FORMATS, save
 from tracker.fusion.trajectories import Trajectories
+from tracker.io.importing.gathering import gather
 from tracker.io.read.pieces import DetectionPiece, TruthPiece
 from tracker.parameters.catalogue import RunParameters
 from tracker.sequences.sequence import GroundTruth
@@ -166,6 +167,19 @@ def test_the_truth_on_the_ground_plane_comes_back_as_places(tmp_path: Path) -> N
     np.testing.assert_allclose(piece.positions[:, :2], own.positions[:, :2], atol=1e-9)
     assert np.isnan(piece.positions[:, 2]).all()
     np.testing.assert_array_equal(piece.valid, own.ids != 4)
+
+
+def test_descriptions_of_sequences_are_read_with_their_truth(tmp_path: Path) -> None:
+    own = RUN.tracks
+    truth = GroundTruth(own.frames, own.ids, own.positions, np.ones(len(own.ids), dtype=bool))
+    run = ExportedRun(replace(SEQUENCE, ground_truth=truth), own, RunParameters())
+    save(tmp_path / "mot", FORMATS["motchallenge"], run)
+    found = {one.label: one for one in gather([tmp_path / "mot"])}
+    assert [one.complaint for one in found.values() if one.complaint] == []
+    descriptions = [label for label in found if label.endswith("seqinfo.ini")]
+    assert len(descriptions) == 1 + len(SEQUENCE.cameras)
+    for label in descriptions:
+        assert found[label].read_with == label.replace("seqinfo.ini", "gt/gt.txt")
 
 
 @pytest.mark.parametrize(("form", "suffix"), [("opencv", ".yml"), ("pose2sim", ".toml")])

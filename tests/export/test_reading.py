@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.export.test_read_back import RUN
@@ -132,6 +133,39 @@ def test_a_file_of_another_kind(tmp_path: Path, name: str, content: bytes, words
     assert "\n" not in str(caught.value)
     with pytest.raises(SequenceError, match="cannot be read"):
         read_tracks(tmp_path / f"none{Path(name).suffix}")
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [
+        ("a.glb", "glTF"), ("a.GLTF", "glTF"), ("a.rrd", "Rerun"), ("a.html", "HTML report"),
+        ("a.mp4", "MP4"),
+    ],
+)  # fmt: skip
+def test_a_form_that_is_only_written_is_named_with_those_that_are_read(
+    tmp_path: Path, name: str, word: str
+) -> None:
+    (tmp_path / name).write_bytes(b"glTF\x8f")
+    with pytest.raises(SequenceError) as caught:
+        read_tracks(tmp_path / name)
+    assert str(caught.value) == (
+        f"{name}: expected tracks as CSV, JSON, Parquet, TRC or MOTChallenge's ground plane, found "
+        f"{word}, which is written but not read; write the run in one of those, as `runs export` "
+        "does"
+    )
+
+
+def test_of_a_folder_the_one_file_of_the_ground_plane_is_read(tmp_path: Path) -> None:
+    save(tmp_path / "mot", FORMATS["motchallenge"], RUN)
+    (file,) = tmp_path.rglob("*-ground-plane.txt")
+    np.testing.assert_array_equal(
+        read_tracks(tmp_path / "mot").positions, read_tracks(file).positions
+    )
+    with pytest.raises(SequenceError, match=r"found none; name the file$"):
+        read_tracks(tmp_path)
+    file.with_name("b-ground-plane.txt").write_bytes(file.read_bytes())
+    with pytest.raises(SequenceError, match=r"found trackers/.*, trackers/.*; name the file$"):
+        read_tracks(tmp_path / "mot")
 
 
 def test_a_table_of_something_else(tmp_path: Path) -> None:

@@ -74,12 +74,14 @@ def test_what_cannot_be_read_keeps_nobody_up(tmp_path: Path) -> None:
         write_crossing(folder, frames=20)
     (bad / "sequence.toml").write_text("format = 99\n")
     place_of(spoilt).write_text("[[correction]]\nkind = 7\n")
-    (tmp_path / "list.txt").write_text("# all\ngood\nbad\nspoilt\n")
+    (tmp_path / "list.txt").write_text("# all\ngood\nbad\nspoilt\nroom44-4p\nnone/*\n")
     places = places_of([f"@{tmp_path / 'list.txt'}"])
     found = run(places, tmp_path / "library.sqlite3", Serial())
-    assert [one.run is not None for one in found] == [True, True, False, False, False, False]
+    assert [one.run is not None for one in found] == [True, True, *8 * [False]]
     assert all("format" in one.words for one in found[2:4])
-    assert all(place_of(spoilt).name in one.words for one in found[4:])
+    assert all(place_of(spoilt).name in one.words for one in found[4:6])
+    assert all('there is no sequence "room44-4p"' in one.words for one in found[6:8])
+    assert all("none/*: there is no such folder" in one.words for one in found[8:])
 
 
 def test_a_list_names_folders_patterns_and_lists_beside_it(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from tracker.parameters.catalogue import PARAMETERS
 from tracker.studies.errors import StudyError
 from tracker.studies.jobs import Job, Outcome
 from tracker.studies.report import report_html
-from tracker.studies.store import Store, create
+from tracker.studies.store import Store, create, free_name
 from tracker.studies.tuning import tuning
 
 
@@ -135,3 +135,37 @@ def test_a_built_in_room_is_tuned_though_a_folder_of_its_name_is_there(
         ("room44-3p", "room44-3p"), ("./room44-3p", str(tmp_path / "room44-3p")),
     ):  # fmt: skip
         assert tuning("t", [name], minutes=1.0, changes={}).recordings == (place,)
+
+
+def test_speeds_are_not_compared_since_the_first_run_has_the_start_of_the_program(
+    tmp_path: Path,
+) -> None:
+    def do(job: Job) -> Outcome:
+        found = outcome(job, 0.9 - 0.1 * abs(of(job, "fusion.detection_probability") - 0.7))
+        found.figures["speed"] = 100.0 if job.values else 8.0
+        return found
+
+    store = study(tmp_path)
+    run(store, Serial(do))
+    compared = {
+        row["key"]: (row["default"], row["after"]) for row in store.fact("tuned")["figures"]
+    }
+    assert list(compared) == ["score", "hota", "idf1"]
+    assert compared["score"][0] < compared["score"][1]
+
+
+@pytest.mark.parametrize(
+    ("words", "plain"),
+    [
+        ("tune Hall (north) [2] & yard", "tune Hall -north- -2- - yard"),
+        ("tune größe_1.5 m²", "tune größe_1.5 m"),
+        ("tune " + 90 * "a", "tune " + 45 * "a"),
+        ("(…)", "study"),
+        ("", "study"),
+    ],
+)
+def test_any_words_give_a_name_that_is_free(tmp_path: Path, words: str, plain: str) -> None:
+    for number in (1, 2):
+        name = free_name(words, tmp_path / "studies")
+        assert name == f"{plain} {number}"
+        create(definition(tmp_path, name), tmp_path / "studies")

@@ -12,9 +12,11 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.export.json_file import TracksFile
+from tracker.export.registry import FORMATS
 from tracker.export.tracks_csv import BOX, COLUMNS, COVARIANCE, HEIGHT, TrackFile, read_tracks_csv
 from tracker.export.trc import Y_UP
 from tracker.files.validated import InvalidJson, parse_json
+from tracker.io.read.detections.motchallenge import GROUND_PLANE, TRACKEVAL
 from tracker.io.read.pieces import FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -28,17 +30,43 @@ _ROUNDING_SIGMA, _ROUNDING_COVARIANCE = 0.5e-4, 0.5e-6
 def read_tracks(path: Path | str) -> TrackFile:
     """Read tracks, in the form that the name's ending states; any other ending is CSV.
 
-    TRC and MOTChallenge have places alone: existences are 1, and standard deviations NaN.
+    Of a folder as MOTChallenge's export writes it, the file of the ground plane is read. TRC and
+    MOTChallenge have places alone: existences are 1, and standard deviations NaN.
 
     Raises:
         SequenceError: If the file does not have valid tracks, or covariances and heights that
             cannot be; the message names the file and what was expected and found.
     """
-    path = Path(path)
+    path = _ground_plane(Path(path)) if Path(path).is_dir() else Path(path)
+    suffix = path.suffix.lower()
     form = {".json": _json, ".parquet": _parquet, ".trc": _places, ".txt": _places}
-    tracks = form.get(path.suffix.lower(), read_tracks_csv)(path)
+    for one in FORMATS.values():
+        if suffix in (one.suffix, f".{one.name}") and suffix not in (".csv", *form):
+            raise SequenceError(
+                f"{path.name}: expected tracks as CSV, JSON, Parquet, TRC or MOTChallenge's ground "
+                f"plane, found {one.word}, which is written but not read; write the run in one of "
+                "those, as `runs export` does"
+            )
+    tracks = form.get(suffix, read_tracks_csv)(path)
     _check(path.name, tracks)
     return tracks
+
+
+def _ground_plane(folder: Path) -> Path:
+    """Return the file of the ground plane in a folder as MOTChallenge's export writes it.
+
+    Raises:
+        SequenceError: If there is none, or more than one.
+    """
+    pattern = f"trackers/{TRACKEVAL}/*/*/data/*-{GROUND_PLANE}.txt"
+    found = sorted(folder.glob(pattern))
+    if len(found) != 1:
+        names = ", ".join(str(file.relative_to(folder)) for file in found) or "none"
+        raise SequenceError(
+            f"{folder}: expected a file of tracks, or a folder with one file {pattern} as "
+            f"`track --format motchallenge` writes it, found {names}; name the file"
+        )
+    return found[0]
 
 
 def _check(where: str, tracks: TrackFile) -> None:

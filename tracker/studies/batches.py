@@ -52,14 +52,22 @@ def places_of(names: Sequence[str]) -> list[str]:
     """Return the built-in recordings and the absolute folders that names refer to, without
     duplicates.
 
+    A name that matches nothing is returned as it is: the batch reports why it cannot be opened.
+
     Args:
         names: Names of built-in recordings, folders, patterns of folders, or ``@FILE`` for a file
             with one of these on each line.
 
     Raises:
-        StudyError: If a name matches nothing.
+        StudyError: If a file of names cannot be read.
     """
-    return definition.places_of(_without_lists(names), Path.cwd())
+    found: list[str] = []
+    for name in _without_lists(names):
+        try:
+            found += definition.places_of([name], Path.cwd())
+        except StudyError:
+            found.append(name)
+    return list(dict.fromkeys(found))
 
 
 def _without_lists(names: Sequence[str], files: tuple[Path, ...] = ()) -> Iterator[str]:

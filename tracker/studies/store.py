@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -270,6 +270,18 @@ def stores(folder: Path) -> list[Store]:
         return []
     found = [Store(path.parent) for path in folder.glob(f"*/{FILE}")]
     return sorted(found, key=lambda one: one.touched(), reverse=True)
+
+
+def free_name(words: str, folder: Path) -> str:
+    """Return a valid name of a study that is not in use in a folder.
+
+    Args:
+        words: The words that the name begins with; characters that no name has become dashes.
+        folder: The folder of all studies.
+    """
+    plain = "".join(c if c.isalpha() or c.isdecimal() or c in " .+-_" else "-" for c in words)
+    plain = plain[:50].strip(" .+-_") or "study"
+    return next(name for n in count(1) if not (folder / (name := f"{plain} {n}")).exists())
 
 
 @contextmanager

@@ -14,20 +14,22 @@ from typing import Any
 
 import pytest
 
-from app.command import listing
+from app.command import listing, studies
 from app.command import main as cli
 from app.command.flags import Track, parse
 from app.command.terminal import rate
+from app.state.presets import keep_preset
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
 from tracker import __version__
 from tracker.export import tracks_csv
 from tracker.kernels import compilation
-from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, REMOVED, RunParameters
 from tracker.parameters.values import ParameterError, value_of, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
+from tracker.studies.definition import read_definition
 
 P_D = "fusion.detection_probability"
 
@@ -168,7 +170,7 @@ def test_help_names_every_flag_with_range_and_default(run: Runs) -> None:
         (["--set", "fusion.survival_probability"], "--set: expected KEY=VALUE"),
         (["--fusion.survival-probability", "2"], "must be between 0.5 and 1, got 2"),
         (["--fusion.survival-probability", "much"], "expected a number, got 'much'"),
-        (["--preset", "magic"], "--preset: expected one of robust, published, got 'magic'"),
+        (["--preset", "magic"], "--preset: expected one of robust, published"),
         (["--fusion", "magic"], "expected one of sequential_phd"),
         (["--single-view", "magic"], "expected one of colour_phd"),
         (["--seed", "-1"], "--seed: expected a whole number from 0, got -1"),
@@ -412,6 +414,66 @@ def test_changes_of_a_flag_beat_those_of_a_preset() -> None:
         Track(sequence="r", output=Path("x"), preset="magic").changes()
 
 
+def test_presets_of_ones_own_are_taken_by_name(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path))
+    values = {P_D: 0.9, "fusion.recognition_doubt": 0.25}
+    keep_preset(tmp_path / "presets.json", "tuned", values)
+    keep_preset(tmp_path / "presets.json", "other", {"fusion.process_noise": 0.1})
+    current = {P_D: 0.9, "fusion.recognition_outlier_probability": 0.25}
+    command = parse(["track", "r", "-o", "x", "--preset", "tuned"])
+    assert command.changes() == current
+    taken: list[Any] = []
+    monkeypatch.setattr(
+        studies, "run_batch", lambda _, changes, *__, **___: taken.append(changes) or []
+    )
+    run("batch", crossing, "--preset", "tuned", "--library", tmp_path / "library.sqlite3")
+    assert taken == [current]
+    status, _, stderr = run("batch", crossing, "--preset", "magic")
+    assert status == 2
+    assert "--preset: expected one of robust, published, tuned, other, got 'magic'" in stderr
+    gone = next(iter(REMOVED))
+    keep_preset(tmp_path / "presets.json", "tuned", {P_D: 0.9, gone: 1.0})
+    with_values(RunParameters(), command.changes())
+    _, _, stderr = run("batch", crossing, "--preset", "tuned", "--set", "fusion.nothing=1")
+    assert f"{gone} no longer exists" in stderr
+    (tmp_path / "presets.json").write_text('{"tuned": 3}')
+    _, _, stderr = run("batch", crossing, "--preset", "tuned")
+    assert f"{tmp_path / 'presets.json'}: tuned: expected an object, found 3" in stderr
+
+
+def test_a_batch_takes_the_methods_as_track_does(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[Any] = []
+    monkeypatch.setattr(
+        studies, "run_batch", lambda _, changes, *__, **___: taken.append(changes) or []
+    )
+    flags = ["--single-view", "jpda", "--fusion", "sequential_phd", "--smoothing", "none"]
+    flags += ["--set", "fusion_method=association_matrix"]
+    assert run("batch", crossing, *flags, "--library", tmp_path / "library.sqlite3")[0] == 0
+    assert taken == [parse(["track", "r", "-o", "x", *flags]).changes()]
+    assert taken[0] == {
+        "fusion_method": "sequential_phd", "single_view": "jpda", "smoothing_method": "none",
+    }  # fmt: skip
+    status, _, stderr = run("batch", crossing, "--fusion", "magic")
+    assert (status, "expected one of" in stderr) == (2, True)
+
+
+@pytest.mark.full
+def test_a_batch_goes_on_without_a_recording_that_is_missing(
+    run: Runs, crossing: Path, tmp_path: Path
+) -> None:
+    line = ("batch", "absent", crossing, "--workers", 1, "--library", tmp_path / "library.sqlite3")
+    status, stdout, stderr = run(*line)
+    assert status == 1
+    _, missing, done = stdout.splitlines()
+    assert re.fullmatch(r"absent +0 .*there is no sequence \"absent\": expected .*", missing)
+    assert re.match(r"crossing +1 ", done)
+    assert "1 of 2 runs stored, 1 of them computed now" in stderr
+
+
 def test_help_is_there_at_once_and_without_the_engine() -> None:
     script = (
         "import sys; from app.command import main as cli\n"
@@ -487,6 +549,32 @@ def test_a_new_study_seeks_what_its_recording_can_tell(
 
 
 @pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("Data/x", "../Data/x"),
+        ("./Data/*/", "../Data/*"),
+        ("studies/y", "y"),
+        ("studies/room44-3p", "./room44-3p"),
+        ("../far/z", "{parent}/far/z"),
+        ("room44-3p", "room44-3p"),
+        ("absent", "absent"),
+    ],
+)
+def test_a_new_study_names_its_recording_as_seen_from_its_file(
+    run: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, written: str
+) -> None:
+    home = tmp_path / "home"
+    for place in ("Data/x", "studies/y", "studies/room44-3p", "../far/z"):
+        write_crossing(home / place, frames=2)
+    monkeypatch.chdir(home)
+    assert run("study", "new", "studies/s.toml", "--recording", name)[0] == 0
+    text = (home / "studies" / "s.toml").read_text(encoding="utf-8")
+    assert f'recordings = ["{written.format(parent=tmp_path)}"]' in text
+    if name != "absent":
+        read_definition(Path("studies/s.toml"))
+
+
+@pytest.mark.parametrize(
     ("line", "option", "values"),
     [
         (
@@ -505,3 +593,12 @@ def test_an_option_given_twice_loses_neither(
     given = [word for one in values for word in (f"--{option}", one)]
     command: Any = parse([*line, *given])
     assert getattr(getattr(command, "action", command), option) == values
+
+
+def test_a_recording_of_any_name_is_tuned(
+    run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(crossing, recording := tmp_path / "Hall (north) [2] & yard")
+    monkeypatch.setattr(studies, "run", lambda *_, **__: studies.INTERRUPTED)
+    status, _, stderr = run("tune", f"{recording}/", "--studies", tmp_path / "studies")
+    assert (status, "study resume 'tune Hall -north- -2- - yard 1'" in stderr) == (130, True)

@@ -127,14 +127,22 @@ _ARCHIVE = _Refused(
 )
 
 
+_WITHOUT_COMPLAINT = _holds(r"\A\s*\[Sequence\]\s")
+"""Whether a file is MOTChallenge's ``seqinfo.ini``, which boxes are read with. Its first sign is
+that of JSON, so that formats of JSON complain of the next."""
+
+
 def refusal(file: SourceFile, complaint: FormatError | None = None) -> FormatError | None:
-    """Return the error that names the format of an unreadable file and what to do.
+    """Return the error that names the format of an unreadable file and what to do; None for a file
+    that no format has to read.
 
     Args:
         file: A file that no format reads.
         complaint: The error of a format that recognised the beginning of the file; it is returned
             if the file's format is not known here, and is preferred to its being an archive.
     """
+    if _WITHOUT_COMPLAINT(file):
+        return None
     for one in (*_KNOWN, _ARCHIVE) if complaint is None else _KNOWN:
         if one.is_it(file):
             return file.error(f"is {one.what}, which is not read; {one.instead}")

@@ -72,6 +72,9 @@ def read(file: SourceFile) -> Iterator[Piece]:
     is_truth = columns in (8, 9) and set(np.unique(table[:, 6])) <= {0.0, 1.0}
     # the ninth number of the ground truth is how much of a person is seen; -1 is of a tracker's
     is_truth &= columns < 9 or bool((table[:, 8] >= 0.0).all())
+    challenge = file.path.parent.parent / SEQUENCE
+    if challenge.is_file():
+        file.companions.append(challenge)
     name = file.path.parent.parent.name if is_truth else file.path.stem
     if name.endswith(f"-{GROUND_PLANE}") and (is_truth or columns == 10):
         middles = boxes[:, :2] + boxes[:, 2:] / 2.0
@@ -111,9 +114,6 @@ def read(file: SourceFile) -> Iterator[Piece]:
     placed = np.zeros(len(table), dtype=bool)
     if columns == 10:
         placed = (table[:, 7:10] != -1.0).any(axis=1) & (ids >= 0)
-    challenge = file.path.parent.parent / SEQUENCE
-    if challenge.is_file():
-        file.companions.append(challenge)
     if placed.any() or challenge.is_file() or file.path.parts[-5:-4] == (TRACKEVAL,):
         boxes = boxes - [1.0, 1.0, 0.0, 0.0]
     yield DetectionPiece(
