@@ -54,13 +54,13 @@ def is_missing(path: Path) -> bool:
     return False
 
 
-def _stated(variable: str) -> Path | None:
+def _from_environment(variable: str) -> Path | None:
     """The folder or file that a variable of the environment names."""
     own = os.environ.get(variable)
     return Path(own).expanduser().absolute() if own else None
 
 
-def _usual(place: Callable[..., Path], otherwise: str) -> Path:
+def _of_platform(place: Callable[..., Path], otherwise: str) -> Path:
     """One of the platform's folders of this program, or a folder of home where there is none."""
     try:
         found = place("multiview-phd", appauthor=False)
@@ -71,7 +71,7 @@ def _usual(place: Callable[..., Path], otherwise: str) -> Path:
 
 def data_folder() -> Path:
     """Return the platform's folder for user data."""
-    return _usual(platformdirs.user_data_path, "multiview-phd")
+    return _of_platform(platformdirs.user_data_path, "multiview-phd")
 
 
 def cache_folder() -> Path:
@@ -80,8 +80,8 @@ def cache_folder() -> Path:
     Rendered recordings, results of finished stages and compiled kernels each have a folder in it.
     All of it can be computed again and may be deleted at any time.
     """
-    usual = _usual(platformdirs.user_cache_path, ".cache/multiview-phd")
-    return _stated("MULTIVIEW_PHD_CACHE") or usual
+    usual = _of_platform(platformdirs.user_cache_path, ".cache/multiview-phd")
+    return _from_environment("MULTIVIEW_PHD_CACHE") or usual
 
 
 def cache_bytes() -> int:
@@ -107,18 +107,20 @@ def settings_folder() -> Path:
 
     Unlike the caches, the settings cannot be computed again.
     """
-    usual = _usual(partial(platformdirs.user_config_path, roaming=True), ".config/multiview-phd")
-    return _stated("MULTIVIEW_PHD_SETTINGS") or usual
+    usual = _of_platform(
+        partial(platformdirs.user_config_path, roaming=True), ".config/multiview-phd"
+    )
+    return _from_environment("MULTIVIEW_PHD_SETTINGS") or usual
 
 
 def library_file() -> Path:
     """Return ``$MULTIVIEW_PHD_LIBRARY``, else ``library.sqlite3`` in :func:`data_folder`."""
-    return _stated("MULTIVIEW_PHD_LIBRARY") or data_folder() / "library.sqlite3"
+    return _from_environment("MULTIVIEW_PHD_LIBRARY") or data_folder() / "library.sqlite3"
 
 
 def detectors_folder() -> Path:
     """Return ``$MULTIVIEW_PHD_DETECTORS``, else ``detectors`` in :func:`data_folder`."""
-    return _stated("MULTIVIEW_PHD_DETECTORS") or data_folder() / "detectors"
+    return _from_environment("MULTIVIEW_PHD_DETECTORS") or data_folder() / "detectors"
 
 
 def files_matching(folder: Path, pattern: str) -> list[Path]:
