@@ -612,6 +612,8 @@ class Check:
     """Check calibration, boxes, room, sizes and time of a sequence; each warning has its remedy."""
 
     sequence: SequenceName
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
 
 
 @dataclass

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.command.arguments import IMPORT_FLAGS, PAIRS, Check, ExportCalibration, Formats, Import
-from app.command.terminal import ASKED, FAILURE, REFUSED, CommandError, print_table, say
+from app.command.terminal import ASKED, FAILURE, REFUSED, CommandError, print_json, print_table, say
 from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ def check_sequence(command: Check) -> int:
     from tracker.sequences import library
 
     sequence = library.open_sequence(command.sequence)
-    return _print_checks(sequence, _checks(sequence))
+    return _print_checks(sequence, _checks(sequence), as_json=command.json)
 
 
 def _checks(sequence: Any) -> list[Any]:
@@ -175,12 +176,27 @@ def _checks(sequence: Any) -> list[Any]:
     return [*check(sequence), *check_shake(sequence)]
 
 
-def _print_checks(sequence: Any, checks: Sequence[Any]) -> int:
-    """Every check in a row; status 1 where one of them warns."""
-    rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]
-    rows += [("!", "opening", warning) for warning in sequence.warnings]
-    print_table(("", "check", "found"), rows)
-    return FAILURE if any(row[0] == SIGNS["warning"] for row in rows) else 0
+def _print_checks(sequence: Any, checks: Sequence[Any], *, as_json: bool = False) -> int:
+    """Every check in a row, or as JSON; status 1 where one of them warns."""
+    from tracker.sequences.finding import warning
+
+    checks = [*checks, *(warning("opening", words) for words in sequence.warnings)]
+    if as_json:
+        facts = [(one, {k: float(v) for k, v in one.numbers.items()}) for one in checks]
+        print_json(
+            [
+                {
+                    "check": one.name, "status": one.status, "found": str(one),
+                    "cameras": one.cameras,
+                    "numbers": {k: v if math.isfinite(v) else None for k, v in numbers.items()},
+                }
+                for one, numbers in facts
+            ]
+        )  # fmt: skip
+    else:
+        rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]
+        print_table(("", "check", "found"), rows)
+    return FAILURE if any(one.status == "warning" for one in checks) else 0
 
 
 def formats(command: Formats) -> None:

@@ -20,7 +20,7 @@ from tracker.files.validated import read_as, set_aside, write_json
 from tracker.parameters.catalogue import PRESETS, REMOVED
 from tracker.parameters.values import ParameterError, changed_values, with_current_keys
 
-YOURS = "The tab Changes lists your presets."
+YOURS = "The tab Parameters lists your presets."
 
 LONGEST_NAME = 60
 """Characters."""

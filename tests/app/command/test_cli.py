@@ -461,6 +461,22 @@ def test_a_batch_takes_the_methods_as_track_does(
     assert (status, "expected one of" in stderr) == (2, True)
 
 
+def test_checks_as_json_say_what_the_table_says(run: Runs, tmp_path: Path) -> None:
+    folder = write_crossing(tmp_path / "crossing", frames=20)
+    file = folder / "sequence.toml"
+    text = re.sub(r"\[target\]\n.*\n", "", file.read_text(encoding="utf-8"))
+    file.write_text(text, encoding="utf-8")
+    status, table, _ = run("check", folder)
+    rows = json.loads(run("check", folder, "--json")[1])
+    assert [row["check"] for row in rows][-1] == "opening"
+    lines = table.splitlines()[1:]
+    assert len(rows) == len(lines) > 5
+    for row, line in zip(rows, lines, strict=True):
+        assert line.startswith({"good": "ok", "warning": "!", "absent": "–"}[row["status"]])
+        assert line.endswith(row["found"])
+    assert run("check", folder, "--json")[0] == status == 1
+
+
 @pytest.mark.full
 def test_a_batch_goes_on_without_a_recording_that_is_missing(
     run: Runs, crossing: Path, tmp_path: Path
