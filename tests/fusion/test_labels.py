@@ -113,6 +113,31 @@ def step(
     return reidentify(names, posterior, pairs, [view], NO_TRACKS, seconds)
 
 
+@pytest.mark.parametrize("interval", [0.5, 2.0])
+def test_the_boxes_of_an_interval_count_as_one(interval: float) -> None:
+    """After a step of a tenth of a second the odds are those of one box to the power of its share
+    of the interval."""
+    view = ViewResult.of_boxes(np.ones((1, 4)), np.ones(1), np.ones((1, 4)))
+    view = replace(view, likenesses=np.array([[0.9, 0.1]]))
+    own = np.zeros(1, dtype=np.int32)
+    pair = Associations(own, own, own, np.ones(1, np.float32))
+    parameters = FusionParams(recognition_interval=interval)
+    _, beliefs = reidentify(
+        IdentityBeliefs.none(),
+        people((1, 0.99, 0.0, 0.0)),
+        pair,
+        [view],
+        NO_TRACKS,
+        0.1,
+        parameters,
+    )
+    outliers = parameters.recognition_outlier_probability
+    odds = np.log((1.0 - outliers) * 0.9 + outliers / 2.0)
+    odds -= np.log((1.0 - outliers) * 0.1 + outliers / 2.0)
+    (one,) = beliefs.log_beliefs
+    assert one[0] - one[1] == pytest.approx(0.1 / interval * odds)
+
+
 def watched(
     names: IdentityBeliefs, labels: list[int], looks: list[list[float]], steps: int
 ) -> IdentityBeliefs:

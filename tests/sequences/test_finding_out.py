@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -277,6 +279,22 @@ def test_a_videos_rate_and_frames_are_counted(tmp_path: Path, fps: float) -> Non
         if index.times is not None:
             assert_allclose(index.times / 1e6, np.arange(30) / fps, atol=2e-3)
         assert index.keys[0] == 0
+
+
+def test_time_stamps_say_the_rate_where_the_header_says_another(tmp_path: Path) -> None:
+    """Twenty frames, a tenth of a second apart, in a file that claims 25 a second."""
+    path = tmp_path / "a.mkv"
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.time_base = Fraction(1, 1000)
+        for number in range(20):
+            frame = av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="rgb24")
+            frame.pts, frame.time_base = 100 * number, Fraction(1, 1000)
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())
+    index = index_video(path)
+    assert (index.frames, index.fps) == (20, 10.0)
 
 
 # ── time stamps
