@@ -23,6 +23,7 @@ def test_a_gap_between_frames_is_decided_at_a_thousand_to_one() -> None:
     assert regular_gap(np.append(even, 101)) == 1
     assert regular_gap(10 * np.arange(5)) == 10
     assert regular_gap(np.array([3, 90])) == 1
+    assert regular_gap(2000 * np.arange(3)) == 2000
 
 
 FRAMES = 8

@@ -28,6 +28,7 @@ from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import with_detector
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.onnx import layouts
 from tracker.single_view.onnx.file import Port, ports_of
 from tracker.single_view.onnx.layouts import proposals
 from tracker.single_view.onnx.network import Network, Settings, _own
@@ -244,6 +245,11 @@ def test_nano_det_against_plain_loops(size: tuple[int, int]) -> None:
     np.testing.assert_allclose(found.corners, rows[:, :4], rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(found.scores, rows[:, 4])
     assert not found.suppressed
+
+
+def test_boxes_without_scores_are_of_no_layout() -> None:
+    boxes = np.zeros((1, 300, 4), np.float32)
+    assert layouts._boxes_and_scores({"boxes": boxes}, SIZE, 0) is None
 
 
 def test_nano_det_has_no_stride_of_0() -> None:

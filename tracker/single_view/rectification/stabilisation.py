@@ -202,8 +202,7 @@ def consensus_shift(
 def _normalise(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray, "h2 w2"]:
     """Normalise mean and contrast of the grey levels locally, against changes of light."""
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-    if reduction < 1.0:
-        grey = cv2.resize(grey, None, fx=reduction, fy=reduction, interpolation=cv2.INTER_AREA)
+    grey = cv2.resize(grey, None, fx=reduction, fy=reduction, interpolation=cv2.INTER_AREA)
     level = grey.astype(np.float32)
     size = (2 * _SMOOTH + 1, 2 * _SMOOTH + 1)
     mean = cv2.blur(level, size)
