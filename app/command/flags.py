@@ -59,7 +59,7 @@ from app.command.arguments import (
 from app.command.terminal import say
 from app.command.typed import WrongValue, flag_of, limited, registry
 from tracker import __version__
-from tracker.files.folders import MOST_GB, settings_folder
+from tracker.files.folders import MOST_GB
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
     GROUPS,
@@ -118,9 +118,9 @@ def preset_values(name: str | None) -> dict[str, Any]:
     """
     if name is None or name in PRESETS:
         return {} if name is None else dict(PRESETS[name])
-    from app.state.presets import stored_presets  # brings the engine
+    from app.state.presets import presets_file, stored_presets  # brings the engine
 
-    own = stored_presets(settings_folder() / "presets.json")
+    own = stored_presets(presets_file())
     if name not in own:
         known = ", ".join((*PRESETS, *own))
         raise ParameterError("--preset", f"expected one of {known}, got {name!r}")

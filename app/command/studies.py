@@ -388,10 +388,9 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
     Raises:
         ParameterError: If the name does not do.
     """
-    from app.state.presets import keep_preset
-    from tracker.files.folders import settings_folder
+    from app.state.presets import keep_preset, presets_file
 
-    keep_preset(settings_folder() / "presets.json", name, values)
+    keep_preset(presets_file(), name, values)
     say(f"kept as the preset {name!r}, which the page lists")
 
 

@@ -15,6 +15,7 @@ from app.errors import FULL, sentence
 from app.state.edits import Edits
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
+from tracker.files.folders import settings_folder
 from tracker.files.lock import locked
 from tracker.files.validated import read_as, set_aside, write_json
 from tracker.parameters.catalogue import PRESETS, REMOVED
@@ -158,6 +159,11 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
     name = _checked(name)
     with locked(path):
         write_json(path, {**stored_presets(path), name: dict(values)})
+
+
+def presets_file() -> Path:
+    """The file with the presets of this user."""
+    return settings_folder() / "presets.json"
 
 
 def stored_presets(path: Path) -> dict[str, dict[str, Any]]:

@@ -285,7 +285,7 @@ async def move(recording: int, wish: Place, opened: Opened) -> RecordingInfo:
                 f"content ({sequence.name})"
             )
     opened.move(recording, str(sequence.folder.absolute()))
-    return next(_recording(r) for r in opened.recordings() if r.id == recording)
+    return _recording(opened.recording(recording))
 
 
 @router.get("/runs/{number}")

@@ -23,7 +23,7 @@ from app.state.history import History
 from app.state.importing import Desk
 from app.state.jobs import Jobs
 from app.state.keeper import Keeper, Marking
-from app.state.presets import OwnPresets
+from app.state.presets import OwnPresets, presets_file
 from app.state.recents import Recents
 from app.state.sensitivity import Sensitivity
 from app.state.snapshot import Notice
@@ -147,7 +147,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         settings_folder() / "edits" if kept else None,
         settings_folder() / "corrections" if kept else None,
     )
-    own_presets = settings_folder() / "presets.json" if kept else None
+    own_presets = presets_file() if kept else None
     presets = app.state.presets = OwnPresets(workbench, edits, own_presets)
     app.state.likelihoods = Likelihoods()
     teaching = Teaching(

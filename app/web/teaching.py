@@ -96,7 +96,7 @@ class Taught(Model):
     read_only: str | None
     """Why it can only be saved as a copy; null where it can be saved."""
     remark: str | None
-    """That its file is not as it was when it was opened or saved; null where it is."""
+    """The reason why its file is not as it was when opened or saved; null where it is."""
     built_in: bool
     copy_to: str
     """A folder that is not there yet, to be offered for a copy."""

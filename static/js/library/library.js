@@ -44,10 +44,10 @@ function lostRecording(moved) {
 		const of = now.id;
 		try {
 			const body = { place: place.value.trim() };
-			const told = await sendJson("POST", `/api/library/recordings/${of}/place`, body);
+			const answer = await sendJson("POST", `/api/library/recordings/${of}/place`, body);
 			place.value = "";
 			complain("");
-			moved(told);
+			moved(answer);
 		} catch (error) {
 			if (!(error instanceof ApiError)) throw error;
 			if (now?.id === of) complain(error.message);

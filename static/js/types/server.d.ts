@@ -1456,7 +1456,7 @@ declare namespace Server {
 		file: string;
 		/** Why it can only be saved as a copy; null where it can be saved. */
 		read_only: string | null;
-		/** That its file is not as it was when it was opened or saved; null where it is. */
+		/** The reason why its file is not as it was when opened or saved; null where it is. */
 		remark: string | null;
 		built_in: boolean;
 		/** A folder that is not there yet, to be offered for a copy. */
