@@ -6,8 +6,9 @@ and at least one must fail with it. A change names a piece of text that is there
 where it is gone, that is reported, and the list is to be brought up to date.
 
 ``python -m tests.mutate --sample N --seed S [PACKAGE]`` draws N changes from the code itself and
-runs the tests of the package that each belongs to, up to the first that fails. Rows of the list
-with ``equivalent = "why"`` have no effect that a test could see: they are never drawn.
+runs the tests of the package that each belongs to and then those of whole runs, up to the first
+that fails. Rows of the list with ``equivalent = "why"`` have no effect that a test could see: they
+are never drawn.
 
 Kernels are compiled for a sample alone: for the narrow tests of the list the interpreter is sooner
 done.
@@ -36,6 +37,8 @@ from itertools import pairwise
 from pathlib import Path
 from queue import Queue
 from typing import Any
+
+from tests.conftest import DATA
 
 ROOT = Path(__file__).resolve().parent.parent
 LIST = Path(__file__).with_name("mutants.toml")
@@ -71,6 +74,8 @@ NOT_DRAWN = (
     "kernels/compilation.py",  # does nothing where kernels are not compiled
     "kernels/checked_cache.py",
 )
+WHOLE_RUNS = ("tests/golden",)
+"""Who is asked of a drawn change that no test of its package notices."""
 NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
 """Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
 
@@ -341,8 +346,8 @@ def modules(root: Path, packages: Many[str]) -> Iterator[str]:
                 yield f"tracker/{name}"
 
 
-def package_tests(root: Path, file: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The tests of a module's package: those that import the module, and the others."""
+def tried_by(root: Path, file: str) -> tuple[tuple[str, ...], ...]:
+    """The tests of a module: of its package those that import it and the others, whole runs."""
     name = file.removeprefix("tracker/")
     special = [key for key in TESTED_BY if name.startswith(key)]
     folders = TESTED_BY[special[0]] if special else (name.split("/")[0],)
@@ -364,7 +369,7 @@ def package_tests(root: Path, file: str) -> tuple[tuple[str, ...], tuple[str, ..
     for path in chosen:
         imported = imports.search(path.read_text(encoding="utf-8"))
         (near if imported else others).append(path.relative_to(root).as_posix())
-    return tuple(near), tuple(others)
+    return tuple(near), tuple(others), WHOLE_RUNS
 
 
 def draw(root: Path, packages: Many[str], count: int, seed: int) -> list[Drawn]:
@@ -382,7 +387,7 @@ def draw(root: Path, packages: Many[str], count: int, seed: int) -> list[Drawn]:
         # one of no effect is replaced by the next draw; all others stay the same
         if (change.file, *change.lines) not in harmless:
             chosen.append(change)
-    return [replace(one, rounds=package_tests(root, one.file)) for one in chosen]
+    return [replace(one, rounds=tried_by(root, one.file)) for one in chosen]
 
 
 # ── trying them
@@ -469,6 +474,8 @@ def try_all(mutants: Many[Mutant | Drawn], workers: int) -> list[Mutant | Drawn]
     """Try each, print what becomes of each, and return those that survive."""
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(workers) as pool:
         copies: Queue[Path] = Queue()
+        # the real recordings lie beside a tree
+        (Path(folder) / DATA.parent.name).symlink_to(DATA.parent)
         for number in range(workers):
             copies.put(copy(Path(folder) / str(number)))
         for mutant in mutants:

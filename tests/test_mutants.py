@@ -16,8 +16,8 @@ from tests.mutate import (
     changes,
     draw,
     is_killed,
-    package_tests,
     read,
+    tried_by,
 )
 
 MUTANTS = read()
@@ -114,8 +114,9 @@ def test_a_seed_gives_the_same_sample_of_all_sorts() -> None:
 
 
 def test_the_tests_that_import_a_module_come_first() -> None:
-    near, others = package_tests(ROOT, "tracker/sequences/clock.py")
+    near, others, whole_runs = tried_by(ROOT, "tracker/sequences/clock.py")
     assert "tests/sequences/test_clock.py" in near
     assert "tests/sequences/test_containers.py" in others
+    assert whole_runs == ("tests/golden",)
     with pytest.raises(Unfit, match="no such package"):
         draw(ROOT, ["nowhere"], 1, 0)
