@@ -281,20 +281,23 @@ def test_a_videos_rate_and_frames_are_counted(tmp_path: Path, fps: float) -> Non
         assert index.keys[0] == 0
 
 
-def test_time_stamps_say_the_rate_where_the_header_says_another(tmp_path: Path) -> None:
-    """Twenty frames, a tenth of a second apart, in a file that claims 25 a second."""
+@pytest.mark.parametrize(("claimed", "spacing", "found"), [(25, 100.0, 10.0), (30, 1e3 / 30, 30.0)])
+def test_time_stamps_say_the_rate_unless_they_are_the_headers_rounded(
+    tmp_path: Path, claimed: int, spacing: float, found: float
+) -> None:
+    """Twenty frames at stamps of whole milliseconds, in a file that claims a rate."""
     path = tmp_path / "a.mkv"
     with av.open(str(path), "w") as file:
-        stream = file.add_stream("mpeg4", rate=25)
+        stream = file.add_stream("mpeg4", rate=claimed)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
         stream.codec_context.time_base = Fraction(1, 1000)
         for number in range(20):
             frame = av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="rgb24")
-            frame.pts, frame.time_base = 100 * number, Fraction(1, 1000)
+            frame.pts, frame.time_base = round(spacing * number), Fraction(1, 1000)
             file.mux(stream.encode(frame))
         file.mux(stream.encode())
     index = index_video(path)
-    assert (index.frames, index.fps) == (20, 10.0)
+    assert (index.frames, index.fps) == (20, found)
 
 
 # ── time stamps
