@@ -263,6 +263,13 @@ def test_a_link_out_of_the_folder_is_neither_read_nor_written(
     assert open_log(folder).problem is None
 
 
+def test_a_link_within_the_folder_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "kept.toml").write_text(LOG, encoding="utf-8")
+    (tmp_path / FILE).symlink_to("kept.toml")
+    assert writing_place(tmp_path) == tmp_path / FILE
+    assert open_log(tmp_path).corrections == parse(LOG, "log")
+
+
 def test_a_malformed_log_is_reported_and_empty(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text(LOG.replace("format = 1", "format = 2"), encoding="utf-8")
     with pytest.raises(CorrectionError, match="line 1") as error:

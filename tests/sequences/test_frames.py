@@ -243,10 +243,9 @@ def test_times_that_cannot_be_trusted_are_not(folders: dict[str, Path]) -> None:
     index = index_video(folders["mp4"] / "cam1.mp4")
     assert index.times is not None
     # a file whose time stamps turn out to say something else than its index
-    wrong = np.concatenate([index.times[:40], index.times[40:] + 1])
-    changed = type(index)(index.path, index.size, index.frames, wrong, index.keys)
-    unknown = type(index)(index.path, index.size, index.frames, None, np.zeros(1, dtype=np.int64))
-    for doubtful in (changed, unknown):
+    late, early = (np.concatenate([index.times[:40], index.times[40:] + by]) for by in (1, -1))
+    for times, keys in ((late, index.keys), (early, index.keys), (None, np.zeros(1, dtype=int))):
+        doubtful = type(index)(index.path, index.size, index.frames, times, keys)
         with VideoDecoder(doubtful) as decoder:
             for frame in [2, 39, 60, 41, 90, 0, 96, 50]:
                 picture = decoder.read(frame)
