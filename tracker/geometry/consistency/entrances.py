@@ -133,8 +133,6 @@ def _reappears(
         there: Position of each track at its last step, world metres.
         fps: Steps per second.
     """
-    if not len(begun):
-        return np.zeros(0, dtype=bool)
     seconds = (begun[:, None] - ended[None]) / fps
     apart = np.linalg.norm(where[:, None, :2] - there[None, :, :2], axis=2)
     near = (seconds > 0.0) & (seconds <= AGAIN_WITHIN) & (apart <= AGAIN_WITHIN)
@@ -148,8 +146,6 @@ def _distance_from_edge(
     import cv2
 
     hull = cv2.convexHull(points.astype(np.float32))
-    if len(hull) < 3:
-        return np.zeros(len(places))
     return np.array(
         [max(0.0, cv2.pointPolygonTest(hull, (float(x), float(y)), True)) for x, y in places]
     )
