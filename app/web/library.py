@@ -231,7 +231,7 @@ def library(settings: Configured, keeper: Kept) -> LibraryInfo:
     told = [_recording(recording) for recording in known]
     places = {recording.place for recording in told}
     for entry in sequences.available(settings.data):
-        place = entry.name if entry.kind == "rendered" else str(entry.folder.absolute())
+        place = entry.name if entry.kind == "rendered" else str(entry.folder)
         if place not in places:
             told.append(
                 RecordingInfo(
