@@ -342,7 +342,9 @@ def pin(number: RowNumber, opened: Opened, bench: Bench) -> State:
     now, sequence = opened_sequence(bench)
     if record_of_recording(now.saved or sequence, now.opened_as).place != result.place:
         if why := opened.recording(result.run.recording).missing:
-            raise ApiError(422, "cannot_pin", as_sentence(f"{why}; {WHERE_NOW}"), field="number")
+            raise ApiError(
+                422, "cannot_pin", as_sentence(why), field="number", hint=as_sentence(WHERE_NOW)
+            )
         raise ApiError(
             409,
             "another_recording",

@@ -372,9 +372,9 @@ def test_a_run_that_cannot_be_pinned_says_why(data: Path, path: Path, tmp_path: 
         library.keep(replace(of_gone, place=str(there)), made(2, kept=tracks(9, 2, cameras=7)))
     with application(data, path, str(there)) as client:
         answer = client.post("/api/library/runs/1/pin")
-        words = f"There is no sequence.toml in {gone} any more; {WHERE_NOW}."
-        assert answer.json()["detail"] == words
         assert answer.status_code == 422
+        assert answer.json()["detail"] == f"There is no sequence.toml in {gone} any more."
+        assert answer.json()["hint"].lower() == f"{WHERE_NOW}.".lower()
         answer = client.post("/api/library/runs/2/pin")
         assert "of 7 cameras, and numbers has" in answer.json()["detail"]
         # of what cannot be opened the page hears by another way
