@@ -61,11 +61,11 @@ from app.command.typed import WrongValue, flag_of, limited, registry
 from tracker import __version__
 from tracker.files.folders import MOST_GB
 from tracker.library import KEEP
+from tracker.parameters import presets
 from tracker.parameters.catalogue import (
     GROUPS,
     METHODS,
     PARAMETERS,
-    PRESETS,
     REMOVED,
     RENAMED,
     Parameter,
@@ -113,20 +113,18 @@ def preset_values(name: str | None) -> dict[str, Any]:
     """The values of ``--preset`` by key; none where none is named.
 
     Raises:
-        ParameterError: If it is neither a built-in preset nor one of the user's own.
-        ValueError: If the file with the user's own presets is not as it was written.
+        ParameterError: If it is neither a built-in preset nor one of the user's own, or these
+            cannot be read.
     """
-    if name is None or name in PRESETS:
-        return {} if name is None else dict(PRESETS[name])
-    from app.state.presets import presets_file, stored_presets  # brings the engine
-
-    own = stored_presets(presets_file())
-    if name not in own:
-        known = ", ".join((*PRESETS, *own))
-        raise ParameterError("--preset", f"expected one of {known}, got {name!r}")
-    for sentence in removed_notes(own[name]):
+    if name is None:
+        return {}
+    try:
+        values = presets.preset_values(name)
+    except ValueError as error:
+        raise ParameterError("--preset", str(error)) from None
+    for sentence in removed_notes(values):
         say(sentence)
-    return own[name]
+    return values
 
 
 def changes_of(command: Track | Batch, flags: Iterable[str] = METHODS) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from tracker.files.text import visible
 from tracker.library import KEEP, repair
 from tracker.library.records import HEADLINES, PROVISIONAL, KeptRun
 from tracker.library.store import Library, open_library
+from tracker.sequences.reader import WHERE_NOW
 
 DAMAGED = 1
 
@@ -97,8 +98,8 @@ def bundle(command: Bundle) -> None:
         recording = library.recording(result.run.recording)
     if recording.missing is not None:
         raise CommandError(
-            f"a bundle needs the recording, and {recording.missing}: choose it in the page's "
-            "Library and name its new folder under Find…, or write its tracks by `runs export`"
+            f"a bundle needs the recording, and {recording.missing}: {WHERE_NOW}, or write its "
+            "tracks by `runs export`"
         )
     sequence = sequence_for_export(recording)
     write_bundle(output, result, sequence, videos=command.videos)

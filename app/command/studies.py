@@ -388,7 +388,8 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
     Raises:
         ParameterError: If the name does not do.
     """
-    from app.state.presets import keep_preset, presets_file
+    from app.state.presets import keep_preset
+    from tracker.parameters.presets import presets_file
 
     keep_preset(presets_file(), name, values)
     say(f"kept as the preset {name!r}, which the page lists")

@@ -13,9 +13,9 @@ from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.consistency import find_repeated, refuse_contradiction
 from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
-from tracker.files.folders import is_missing
 from tracker.review.queue import Queue, ReviewItem, queue
 from tracker.sequences.built_in import opens_by_name
+from tracker.sequences.reader import WHERE_NOW, why_missing
 from tracker.sequences.sequence import Sequence as Recording
 
 _MEND = "Mend the file, or move it away; it is read again then."
@@ -32,10 +32,10 @@ def _mark_of(path: Path) -> tuple[int, int, int] | None:
     return found.st_ino, found.st_mtime_ns, found.st_size
 
 
-def _is_missing(recording: Recording) -> bool:
-    """Whether the folder that the log of a recording belongs to was moved or deleted; what opens by
-    its name has its log in the settings."""
-    return is_missing(recording.folder) and not opens_by_name(recording.folder)
+def _why_missing(recording: Recording) -> str | None:
+    """Why a recording with its log is not in its folder any more; None for what opens by its name
+    and has its log in the settings."""
+    return None if opens_by_name(recording.folder) else why_missing(recording.folder)
 
 
 def _written(corrections: Told, places: Sequence[Path]) -> Path:
@@ -81,7 +81,8 @@ class Correcting:
         with self._lock:
             if self._recording is None or _mark_of(self._log.path) == self._mark:
                 return
-            if _is_missing(self._recording):  # what it said counts as long as nobody says otherwise
+            # what it said counts as long as nobody says otherwise
+            if _why_missing(self._recording):
                 return
             before, self._log = self._log, open_log(self._recording.folder)
             self._mark = _mark_of(self._log.path)
@@ -158,11 +159,8 @@ class Correcting:
     def _put(self, corrections: Told) -> None:
         if self._recording is None:
             raise CorrectionError("no recording is open")
-        if _is_missing(self._recording):  # elsewhere the log would never be read again
-            raise CorrectionError(
-                f"{self._recording.folder} is not there any more: put the folder back, or open the "
-                "recording where it lies now"
-            )
+        if why := _why_missing(self._recording):  # elsewhere the log would never be read again
+            raise CorrectionError(f"{why}; {WHERE_NOW}")
         if self._log.problem is not None:
             raise CorrectionError(f"{self._log.problem}; mend the file, or move it away")
         self._write(self._recording, corrections)

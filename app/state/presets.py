@@ -15,18 +15,16 @@ from app.errors import FULL, sentence
 from app.state.edits import Edits
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
-from tracker.files.folders import settings_folder
 from tracker.files.lock import locked
-from tracker.files.validated import read_as, set_aside, write_json
-from tracker.parameters.catalogue import PRESETS, REMOVED
-from tracker.parameters.values import ParameterError, changed_values, with_current_keys
+from tracker.files.validated import set_aside, write_json
+from tracker.parameters.catalogue import PRESETS
+from tracker.parameters.presets import read_presets, stored_presets
+from tracker.parameters.values import ParameterError, changed_values
 
 YOURS = "The tab Parameters lists your presets."
 
 LONGEST_NAME = 60
 """Characters."""
-
-_KIND = dict[str, dict[str, Any]]
 
 
 class OwnPresets:
@@ -133,7 +131,7 @@ class OwnPresets:
     def _read(self, path: Path) -> Presets:
         """What the file has; a spoilt one is set aside, and what is known stays."""
         try:
-            return _stored(path)
+            return read_presets(path)
         except FileNotFoundError:
             return self._workbench.snapshot().presets
         except (OSError, ValueError) as error:
@@ -153,41 +151,12 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
 
     Raises:
         ParameterError: If the name does not do.
-        ValueError: If the file is not as it was written.
+        ValueError: If the file cannot be read, or is not as it was written.
         OSError: If it cannot be written.
     """
     name = _checked(name)
     with locked(path):
         write_json(path, {**stored_presets(path), name: dict(values)})
-
-
-def presets_file() -> Path:
-    """The file with the presets of this user."""
-    return settings_folder() / "presets.json"
-
-
-def stored_presets(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the presets of a file by name, without a workbench; none where there is no file.
-
-    Raises:
-        ValueError: If the file is not as it was written; the message names it.
-        OSError: If it cannot be read.
-    """
-    try:
-        return _stored(path) if path.is_file() else {}
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-
-
-def _stored(path: Path) -> dict[str, dict[str, Any]]:
-    """The presets of a file, under the names that the parameters have now.
-
-    Parameters that no longer exist stay, so that whoever takes the preset learns of them.
-    """
-    return {
-        name: with_current_keys(values) | {k: v for k, v in values.items() if k in REMOVED}
-        for name, values in read_as(path, _KIND).items()
-    }
 
 
 def _checked(name: str) -> str:

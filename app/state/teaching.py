@@ -70,9 +70,12 @@ class Drafts:
         """Keep them in a folder, a file each; in memory for this start where there is none."""
         self._folder = folder
         self._kept: dict[Path, tuple[Values, Values]] = {}
+        self._moved: dict[Path, Path] = {}
+        """Where recordings lie now, by the folders that they were in before."""
 
     def keep(self, sequence: Path, saved: Values, taught: Values) -> None:
         """Keep what is not saved of a sequence, instead of what was before; nothing, if all is."""
+        sequence = self._moved.get(sequence, sequence)  # it may still be open as it was before
         if saved == taught:
             self.forget(sequence)
             return
@@ -93,6 +96,15 @@ class Drafts:
         if draft is not None:
             self._kept[sequence] = draft
         return draft
+
+    def move(self, before: Path, after: Path) -> None:
+        """Keep what is not saved of a sequence for the folder into which it was moved."""
+        draft = self.read(before)
+        self._moved.pop(after, None)
+        self._moved[before] = after
+        if draft is not None and self.read(after) is None:
+            self.keep(after, *draft)
+            self.forget(before)
 
     def take_earlier(self, sequence: Path) -> tuple[Values, Values] | None:
         """What was saved and taught on a built-in room as it was rendered before; None where
@@ -234,6 +246,11 @@ class Teaching:
     def draft_of(self, folder: Path) -> Path | None:
         """The file that keeps what was taught of a sequence and not saved; None where all is."""
         return self._drafts.file_of(folder)
+
+    def move_draft(self, before: Path, after: Path) -> None:
+        """Keep what was not saved of a sequence for the folder into which it was moved."""
+        with self._lock:
+            self._drafts.move(before, after)
 
     def sequence(self) -> Sequence:
         """The open one.

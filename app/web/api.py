@@ -136,7 +136,10 @@ async def schema() -> Schema:
 def sequences(settings: Configured) -> SequenceList:
     """The built-in rooms and the folders under the data folder."""
     return SequenceList(
-        sequences=[filled(SequenceEntryInfo, entry) for entry in library.available(settings.data)]
+        sequences=[
+            filled(SequenceEntryInfo, entry, folder=str(entry.folder))
+            for entry in library.available(settings.data)
+        ]
     )
 
 

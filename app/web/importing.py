@@ -681,7 +681,7 @@ def recordings(recents: Opened, settings: Configured, desk: AtDesk, bench: Bench
             open=entry.name in open_as,
         )
         for entry in entries
-        if str(entry.folder.absolute()) not in listed and entry.error is None
+        if str(entry.folder) not in listed and entry.error is None
     ]  # fmt: skip
     return Recordings(
         recordings=cards,

@@ -11,7 +11,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Response
 from pydantic import Field
 
-from app.errors import ApiError, sentence
+from app.errors import ApiError, as_sentence, sentence
 from app.messages import Model, RowNumber, filled
 from app.state.keeper import Keeper
 from app.web import results
@@ -19,6 +19,7 @@ from app.web.dependencies import (
     ERRORS,
     Bench,
     Configured,
+    Owned,
     Work,
     a_file,
     begun,
@@ -42,6 +43,7 @@ from tracker.library.store import Library
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import value_of
 from tracker.sequences import library as sequences
+from tracker.sequences.reader import WHERE_NOW
 
 
 class RecordingInfo(Model):
@@ -229,7 +231,7 @@ def library(settings: Configured, keeper: Kept) -> LibraryInfo:
     told = [_recording(recording) for recording in known]
     places = {recording.place for recording in told}
     for entry in sequences.available(settings.data):
-        place = entry.name if entry.kind == "rendered" else str(entry.folder.absolute())
+        place = entry.name if entry.kind == "rendered" else str(entry.folder)
         if place not in places:
             told.append(
                 RecordingInfo(
@@ -270,7 +272,7 @@ def runs(recording: RowNumber, opened: Opened) -> KeptRuns:
 
 
 @router.post("/recordings/{recording}/place")
-async def move(recording: int, wish: Place, opened: Opened) -> RecordingInfo:
+async def move(recording: int, wish: Place, opened: Opened, owners: Owned) -> RecordingInfo:
     """Say where a recording lies now, of which only the runs were still there."""
     folder = Path(wish.place).expanduser()
     known = next((r for r in opened.recordings() if r.id == recording), None)
@@ -285,6 +287,7 @@ async def move(recording: int, wish: Place, opened: Opened) -> RecordingInfo:
                 f"content ({sequence.name})"
             )
     opened.move(recording, str(sequence.folder.absolute()))
+    owners.teaching.move_draft(Path(known.place), sequence.folder)
     return _recording(opened.recording(recording))
 
 
@@ -338,6 +341,10 @@ def pin(number: RowNumber, opened: Opened, bench: Bench) -> State:
     result = opened.result(number)
     now, sequence = opened_sequence(bench)
     if record_of_recording(now.saved or sequence, now.opened_as).place != result.place:
+        if why := opened.recording(result.run.recording).missing:
+            raise ApiError(
+                422, "cannot_pin", as_sentence(why), field="number", hint=as_sentence(WHERE_NOW)
+            )
         raise ApiError(
             409,
             "another_recording",
@@ -347,7 +354,7 @@ def pin(number: RowNumber, opened: Opened, bench: Bench) -> State:
     try:
         bench.pin_kept(run_for_display(sequence, result))
     except ValueError as error:
-        raise ApiError(422, "cannot_open", sentence(error), field="number") from None
+        raise ApiError(422, "cannot_pin", as_sentence(sentence(error)), field="number") from None
     return results.state_of(bench.snapshot())
 
 

@@ -60,6 +60,7 @@ class SequenceInfo(Model):
     name: str
     opened_as: str
     """The name or folder that opens it again."""
+    folder: str
     description: str
     fps: float
     frames: int
@@ -247,6 +248,8 @@ class SequenceEntryInfo(Model):
     name: str
     description: str
     kind: Literal["rendered", "folder"]
+    folder: str
+    """That of what is open: the name of a recording need not be that of its folder."""
     cameras: int | None
     frames: int | None
     error: str | None = None
@@ -381,6 +384,7 @@ def _sequence_of(snapshot: Snapshot) -> SequenceInfo | None:
         sequence,
         key=snapshot.sequence_key,
         opened_as=snapshot.opened_as,
+        folder=str(sequence.folder.absolute()),
         has_pictures=any(view.has_pictures for view in sequence.views),
         has_detections=any(view.detections is not None for view in sequence.views),
         has_truth=sequence.ground_truth is not None,

@@ -23,7 +23,7 @@ from app.state.history import History
 from app.state.importing import Desk
 from app.state.jobs import Jobs
 from app.state.keeper import Keeper, Marking
-from app.state.presets import OwnPresets, presets_file
+from app.state.presets import OwnPresets
 from app.state.recents import Recents
 from app.state.sensitivity import Sensitivity
 from app.state.snapshot import Notice
@@ -41,6 +41,7 @@ from app.web.stream import Stream
 from app.web.timeline import Timelines, names_of
 from tracker.files.folders import settings_folder
 from tracker.library.records import Result
+from tracker.parameters.presets import presets_file
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.stage_cache import MEMORY_BYTES, StageCache
 from tracker.sequences.pictures.frames import CACHE_BYTES

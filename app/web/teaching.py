@@ -12,6 +12,7 @@ from fastapi import APIRouter, Response
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
+from app.errors import as_sentence
 from app.messages import Box, GivenPath, Model, Vector
 from app.state.snapshot import Snapshot
 from app.state.tasks import DetectorFetching
@@ -31,10 +32,10 @@ from app.web.dependencies import (
 )
 from app.web.pictures import checked, missing, picture_of
 from app.web.results import State
-from tracker.files.folders import is_missing
 from tracker.geometry.boxes import Boxes
 from tracker.parameters.catalogue import METHODS, method_of
 from tracker.sequences.built_in import opens_by_name
+from tracker.sequences.reader import WHERE_NOW, why_missing
 from tracker.sequences.sequence import PRESETS, Sequence, Template
 from tracker.sequences.writing.teaching import changes, taught_values
 from tracker.single_view.pictures import colour
@@ -204,8 +205,8 @@ def _remark_on(sequence: Sequence) -> str | None:
     own = sequence.own_file
     if own is None or own.is_same:
         return None
-    if is_missing(own.path):
-        return f"{own.path} is not there any more: put it back."
+    if why := why_missing(sequence.folder):
+        return as_sentence(f"{why}; {WHERE_NOW}")
     return f"{own.path.name} was changed by another program: open the recording again."
 
 
@@ -241,7 +242,7 @@ def taught(bench: Bench, owners: Owned) -> Taught:
         unsaved=changes(taught_values(saved), taught_values(sequence)),
         file=f"{sequence.folder.name}/sequence.toml",
         # a folder that is not there cannot be copied either
-        read_only=None if is_missing(sequence.folder) else owners.teaching.why_not_in_place(),
+        read_only=None if why_missing(sequence.folder) else owners.teaching.why_not_in_place(),
         remark=_remark_on(sequence),
         built_in=bool(opens_by_name(sequence.folder)),
         copy_to=str(owners.teaching.copy_folder()),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+import re
 import sys
 import tomllib
 from collections.abc import Callable
@@ -24,7 +25,7 @@ from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.reader import FILE, read_sequence
+from tracker.sequences.reader import FILE, WHERE_NOW, read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.saving import rewritten, taught_in
@@ -349,10 +350,12 @@ def test_a_place_that_may_only_be_read_offers_the_copy(
 def test_a_folder_that_is_gone_says_so(folder: Path, tmp_path: Path) -> None:
     opened = read_sequence(folder)
     folder.rename(tmp_path / "elsewhere")
-    assert saving.why_not_in_place(folder) == f"{folder} is not there any more"
-    with pytest.raises(SequenceError, match="is not there any more; put the folder back"):
+    why = f"there is no {FILE} in {folder} any more"
+    assert saving.why_not_in_place(folder) == why
+    words = re.escape(f"cannot be saved, since {why}; {WHERE_NOW}")
+    with pytest.raises(SequenceError, match=words):
         saving.save(taught(opened, add), opened)
-    with pytest.raises(SequenceError, match="is not there any more; put the folder back"):
+    with pytest.raises(SequenceError, match=words):
         saving.save_copy(taught(opened, add), opened, tmp_path / "copy")
     assert not (tmp_path / "copy").exists()
 

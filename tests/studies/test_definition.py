@@ -5,8 +5,15 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+import pytest
+
+from app.state.presets import keep_preset
 from tests.studies.small import PARAMETERS, definition, recording
+from tracker.parameters.catalogue import PRESETS, REMOVED
+from tracker.parameters.values import removed_notes
 from tracker.studies.definition import definition_of, example, read_definition
+from tracker.studies.errors import StudyError
+from tracker.studies.store import create
 
 
 def test_what_is_written_is_read_back(tmp_path: Path) -> None:
@@ -24,6 +31,34 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     assert read_definition(file) == given
     assert given.seeds == (3, 1)
     assert given.recordings == (str(tmp_path / "recording"),)
+
+
+def test_a_preset_is_built_in_or_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path))
+    presets = tmp_path / "presets.json"
+    gone = next(iter(REMOVED))
+    keep_preset(presets, "night", {"fusion.clutter_rate": 5.0, "fusion.birth_rate": 0.5, gone: 1.0})
+    given = definition(tmp_path, preset="night", values={"fusion.birth_rate": 0.25})
+    assert given.held() == {"fusion.clutter_rate": 5.0, "fusion.birth_rate": 0.25}
+    assert given.notes == removed_notes([gone])
+    assert definition(tmp_path, preset="published").held() == PRESETS["published"]
+
+    # a study goes on with the values that it began with
+    store = create(given, tmp_path / "studies")
+    assert create(given, tmp_path / "studies").folder == store.folder
+    keep_preset(presets, "night", {"fusion.clutter_rate": 9.0})
+    assert store.definition().held() == given.held()
+
+    known = "expected one of robust, published, night"
+    with pytest.raises(StudyError, match=f'study.toml, preset: {known}, found "nigth"'):
+        definition(tmp_path, preset="nigth")
+    presets.write_text('{"night": 3}')
+    with pytest.raises(StudyError, match=r"study.toml, preset: .*night: expected an object"):
+        definition(tmp_path, preset="night")
+    presets.unlink()
+    presets.mkdir()
+    with pytest.raises(StudyError, match=r"study.toml, preset: .*presets\.json: "):
+        definition(tmp_path, preset="night")
 
 
 def test_the_example_is_a_study(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -55,6 +57,45 @@ def test_the_first_trial_is_the_default_and_real_runs_are_scored(tmp_path: Path)
         assert one.objectives == (pytest.approx((figures["hota"] + figures["idf1"]) / 2.0),)
         assert len(outcome.tracks) == 24
         assert figures["speed"] > 0.0
+
+
+TIMED = """
+import sys
+from pathlib import Path
+from tests.studies.small import Serial, run
+from tracker.kernels import compilation
+from tracker.studies import worker
+from tracker.studies.store import Store
+
+compute = worker.pipeline.compute
+
+def counted(*arguments, **named):
+    before = compilation.counts()[0]
+    found = compute(*arguments, **named)
+    print("timed" if "steps" not in named else "first", compilation.counts()[0] - before)
+    return found
+
+worker.pipeline.compute = counted
+run(Store(Path(sys.argv[1])), Serial())
+"""
+
+
+def test_the_first_speed_is_not_that_of_loading_kernels(tmp_path: Path) -> None:
+    store = study(
+        tmp_path, trials=4, objectives=["speed"], prune=False, search="grid",
+        parameters={"fusion_method": {}, "fusion.update": {}},
+    )  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", TIMED, str(store.folder)],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stderr
+    loaded = [(how, int(count)) for how, count in map(str.split, done.stdout.splitlines())]
+    assert ("timed", 0) in loaded
+    assert {count for how, count in loaded if how == "timed"} == {0}
+    assert sum(count for how, count in loaded if how == "first") > 0
 
 
 def test_a_search_finds_what_is_better(tmp_path: Path) -> None:

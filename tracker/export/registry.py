@@ -11,6 +11,7 @@ from pathlib import Path
 from tracker.export import gltf, json_file, motchallenge, parquet, rerun_file, tracks_csv, trc
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.files.atomic import new_folder, replacing, zip_folder
+from tracker.sequences.reader import WHERE_NOW, why_missing
 from tracker.sequences.sequence import Sequence
 
 
@@ -49,10 +50,10 @@ class Format:
             ValueError: If the sequence lacks what the format needs, or a package is not installed.
         """
         if not sequence.views and (self.needs_recording or self.needs_truth or self.needs_pictures):
+            why = why_missing(sequence.folder)
             raise ValueError(
-                f"{self.word} needs the recording, and there is none in {sequence.folder} any "
-                "more: choose it in the page's Library and name its new folder under Find…, or "
-                "write CSV, JSON, Parquet or TRC"
+                f"{self.word} needs the recording, and {why}: {WHERE_NOW}, or write CSV, JSON, "
+                "Parquet or TRC"
             )
         if self.needs_truth and sequence.ground_truth is None:
             raise ValueError(

@@ -43,17 +43,6 @@ def _instead() -> Path:
     return Path(tempfile.mkdtemp(prefix="multiview-phd-"))
 
 
-def is_missing(path: Path) -> bool:
-    """Whether a file or folder does not exist any more, in contrast to one that may not be read."""
-    try:
-        path.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return True
-    except OSError:
-        return False
-    return False
-
-
 def _from_environment(variable: str) -> Path | None:
     """The folder or file that a variable of the environment names."""
     own = os.environ.get(variable)

@@ -77,7 +77,8 @@ def kernel(function: _F) -> _F:
 def pixel_kernel(function: _F) -> _F:
     """Compile like :func:`kernel`, for loops over pixels or samples, never run as plain Python."""
     compiled = compiled_later(function)
-    _KERNELS.append(compiled)
+    if not _config.DISABLE_JIT:
+        _KERNELS.append(compiled)
     return compiled
 
 

@@ -7,7 +7,6 @@ read off; a field that is computed from other columns has the expression of SQL 
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -15,7 +14,7 @@ from typing import Any, Literal, TypeVar
 from tracker.library.columns import KeptTracks
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import removed_notes, with_current_keys
-from tracker.sequences.reader import FILE
+from tracker.sequences.reader import why_missing
 
 Source = Literal["track", "page", "bundle", "batch"]
 """The origin of a run: a command, the page, or a bundle that was unpacked."""
@@ -85,10 +84,7 @@ class Recording(_Recording):
     @property
     def missing(self) -> str | None:
         """The reason why the folder of the recording cannot be opened; None if it is there."""
-        # of the module, since a method fails at a folder that may not be read any more
-        if self.kind != "folder" or os.path.isfile(Path(self.place) / FILE):
-            return None
-        return f"there is no {FILE} in {self.place} any more"
+        return why_missing(Path(self.place)) if self.kind == "folder" else None
 
 
 @dataclass(slots=True)  # a frozen one takes six times as long to make, and lists have thousands

@@ -37,7 +37,7 @@ class SequenceEntry:
     frames: int
     """The number of steps; 0 if the file does not state it."""
     folder: Path
-    """The folder of the sequence."""
+    """The folder of the sequence, without symbolic links, as that of an open one."""
     error: str | None = None
     """The reason why the sequence cannot be opened, in one sentence."""
 
@@ -80,7 +80,7 @@ def _entry(folder: Path, kind: Literal["rendered", "folder"] = "folder") -> Sequ
         kind=kind,
         cameras=cameras,
         frames=frames,
-        folder=folder,
+        folder=folder.resolve(),
         error=error,
     )
 

@@ -35,6 +35,25 @@ MOST_DEPTH = 12
 TOP = ("format", "name", "description", "fps", "frames", "room", "target", "camera", "template",
        "ground_truth")  # fmt: skip
 
+WHERE_NOW = "put it back, or name its new folder under Find… in the page's Library"
+"""What to do about a recording that was moved."""
+
+
+def why_missing(folder: Path) -> str | None:
+    """Return why a recording is not in its folder any more; None if it is there, or if the folder
+    may not be read.
+
+    Args:
+        folder: The folder in which the recording was when it was opened.
+    """
+    try:
+        (folder / FILE).stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return f"there is no {FILE} in {folder} any more"
+    except OSError:
+        return None
+    return None
+
 
 @dataclass(frozen=True, slots=True)
 class SequenceSummary:

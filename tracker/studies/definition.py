@@ -23,7 +23,8 @@ from pydantic import (
 )
 
 from tracker.files.text import not_utf_8, shown
-from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.presets import preset_values
 from tracker.parameters.values import removed_notes, value_of, with_current_keys, with_values
 from tracker.sequences.fields import did_you_mean
 from tracker.sequences.reader import FILE
@@ -49,7 +50,7 @@ _EXPECTED = {
     "search": f"one of {', '.join(get_args(Search))}",
     "objectives": f"some of {', '.join(OBJECTIVES)}",
     "prune": "true or false",
-    "preset": f"one of {', '.join(PRESETS)}",
+    "preset": "the name of a preset, or a table [preset]",
     "propose": "a whole number from 0 to 100",
     "seed": f"a whole number from 0 to {2**32 - 1}",
     "values": "a table [values]",
@@ -189,8 +190,8 @@ class StudyDefinition(BaseModel):
     the best of them can be proposed; 0 for no proposal."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
     """The seed of the sampler."""
-    preset: str | None = None
-    """The preset whose values all trials have; None for none."""
+    preset: Annotated[Mapping[str, Any], BeforeValidator(_checked_values)] = {}
+    """The values of the preset that all trials have; a file may name the preset instead."""
     values: Annotated[Mapping[str, Any], BeforeValidator(_checked_values)] = {}
     """Fixed values of all trials, which override the recording's defaults and the preset."""
     start: Annotated[Mapping[str, Any], BeforeValidator(_checked_values)] = {}
@@ -208,9 +209,6 @@ class StudyDefinition(BaseModel):
     @model_validator(mode="after")
     def _check_tables(self) -> StudyDefinition:
         """Check that each parameter is in the table where it belongs."""
-        if self.preset is not None and self.preset not in PRESETS:
-            words = f"expected {_EXPECTED['preset']}, found {shown(self.preset)}"
-            raise _InvalidFieldError("preset", words)
         keys = {one.key for one in self.varied}
         for key in self.values:
             if key in keys:
@@ -225,12 +223,12 @@ class StudyDefinition(BaseModel):
     def held(self) -> dict[str, Any]:
         """Return the fixed values of all trials by key: the preset's, overridden by
         :attr:`values`."""
-        return {**(PRESETS[self.preset] if self.preset else {}), **self.values}
+        return {**self.preset, **self.values}
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of the study's file as plain values."""
         content = self.model_dump(mode="json", exclude={"varied"}, exclude_none=True)
-        for name in ("values", "start"):
+        for name in ("preset", "values", "start"):
             if not content[name]:
                 del content[name]
         return content | {"parameters": {one.key: one.table() for one in self.varied}}
@@ -300,11 +298,16 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Stud
         StudyError: If a field is not valid; the message names the field, and states what was
             expected and found.
     """
+    found = {"parameters": {}, **found}
+    if isinstance(name := found.get("preset"), str):
+        try:
+            # its values and not its name are stored: the user may change a preset later
+            found["preset"] = preset_values(name)
+        except ValueError as error:
+            raise StudyError(f"{where}, preset: {error}") from None
     try:
-        definition = StudyDefinition.model_validate(
-            {"parameters": {}, **found}, context={"folder": folder}
-        )
-        tables = (found.get(name) for name in ("values", "start", "parameters"))
+        definition = StudyDefinition.model_validate(found, context={"folder": folder})
+        tables = (found.get(name) for name in ("preset", "values", "start", "parameters"))
         keys = [key for table in tables if isinstance(table, Mapping) for key in _keys(table)]
         definition._notes = removed_notes(dict.fromkeys(keys))
         return definition
@@ -468,7 +471,7 @@ prune = true
 # On how many other seeds the best are measured again at the end, before one is proposed.
 propose = 2
 
-# Values to start from, and the sampler's seed.
+# The preset to start from, built in or one of your own, and the sampler's seed.
 preset = "robust"
 seed = 0
 

@@ -226,7 +226,8 @@ def create(definition: StudyDefinition, folder: Path) -> Store:
     place = folder / definition.name
     if place.exists():
         store = Store(place)
-        if store.definition() != definition:
+        # what is stored no longer names what no longer exists, of which the notes speak
+        if store.definition().to_json() != definition.to_json():
             raise StudyError(
                 f'there is another study "{definition.name}" in {folder}; give this one another '
                 f"name, or delete {place}"

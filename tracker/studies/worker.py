@@ -22,8 +22,10 @@ import cv2
 
 from tracker.evaluation import evaluate_sequence
 from tracker.files.folders import cache_folder
+from tracker.kernels import compilation
 from tracker.library.keeping import record_of_recording, record_of_run, thumbnail_of
-from tracker.parameters.values import with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import value_of, with_values
 from tracker.review.self_consistency import estimate
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
@@ -48,6 +50,9 @@ re-use their results."""
 MOST_OPEN = 16
 """Largest number of recordings that a worker keeps open."""
 
+FIRST_STEPS = 32
+"""The number of steps that are computed first in order to load what a run needs."""
+
 KNOWN_TIMES = 4096
 """Largest number of times of stage 1 that a worker stores in memory."""
 
@@ -69,6 +74,8 @@ class _Process:
     """The open recordings with their readers, by the hash of their content, the last used last."""
     stage_seconds: OrderedDict[str, float] = field(default_factory=OrderedDict)
     """Processor time of stage 1, seconds, by the key of the stage."""
+    loaded: set[tuple[object, ...]] = field(default_factory=set)
+    """The recordings, and the values of choices and switches, whose code is loaded."""
     lock: threading.Lock = field(default_factory=threading.Lock)
     """The lock that the thread of a job holds."""
 
@@ -152,8 +159,11 @@ def _opened(job: Job, tell: Tell) -> tuple[Sequence, FrameReader]:
 
 def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
     """Track and evaluate a recording, and return the fields of the outcome by name."""
+    parameters = with_values(pipeline.default_parameters(sequence), job.values)
+    if job.timed:
+        _load(job, sequence, parameters, reader)
     began, begin = time.time(), time.perf_counter()
-    run, seconds = _tracked(job, sequence, reader)
+    run, seconds = _tracked(job, sequence, parameters, reader)
     took = time.perf_counter() - begin
     figures: dict[str, float | None] = {"speed": None}
     if seconds is not None:
@@ -190,7 +200,30 @@ def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
     }
 
 
-def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, float | None]:
+def _load(job: Job, sequence: Sequence, parameters: RunParameters, reader: FrameReader) -> None:
+    """Load the modules and the machine code that a run needs, so that its time is that of the run.
+
+    The first steps are computed, then as many again, until no kernel was loaded by the last ones.
+    """
+    assert _process is not None
+    values = (value_of(parameters, key) for key in (*METHODS, *PARAMETERS))
+    which = (job.content, *(value for value in values if isinstance(value, str | bool)))
+    if which in _process.loaded:
+        return
+    run, steps, loaded = None, FIRST_STEPS, -1
+    while (run is None or not run.complete) and compilation.counts()[0] > loaded:
+        loaded = compilation.counts()[0]
+        run = pipeline.compute(
+            sequence, parameters, seed=job.seed, corrections=job.corrections, steps=steps,
+            reader=reader, previous=run,
+        )  # fmt: skip
+        steps *= 2
+    _process.loaded.add(which)
+
+
+def _tracked(
+    job: Job, sequence: Sequence, parameters: RunParameters, reader: FrameReader
+) -> tuple[Run, float | None]:
     """Return the run, and the processor time that it takes without a cache, seconds.
 
     Stage 1 has threads of its own, whose time is the time of the process minus that of this thread.
@@ -198,7 +231,6 @@ def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, fl
     timed, stage 1 is computed again.
     """
     assert _process is not None
-    parameters = with_values(pipeline.default_parameters(sequence), job.values)
     key = pipeline.stage_keys(sequence, parameters, job.seed)["single_view"]
     known = _process.stage_seconds.get(key)
     if known is None:

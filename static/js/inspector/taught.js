@@ -337,23 +337,24 @@ function saving({ unsaved, file, read_only: why, remark, built_in, copy_to: copy
 	const words = unsaved.join("; ");
 	return h(
 		"div.saving",
-		h(
-			"div.row",
-			{ role: "status" },
-			unsaved.length
-				? [
-						h("span.dot.warn"),
-						h("b", `${unsaved.length} change${unsaved.length > 1 ? "s" : ""} not saved`),
-						h("span.words.cut", { title: words }, words),
-					]
-				: !remark && quiet("All is as the file has it."),
-			remark && [h("span.dot.warn"), h("span.words", remark)],
-			h("span.grow"),
-			unsaved.length > 0 && send("Discard", "discard_taught"),
-			unsaved.length > 0 &&
-				!why &&
-				send("Save", "save_taught", { label: `Save in ${file}`, main: true }),
-		),
+		remark && h("div.row.remark", { role: "status" }, h("span.dot.warn"), h("span", remark)),
+		(unsaved.length > 0 || !remark) &&
+			h(
+				"div.row",
+				{ role: "status" },
+				unsaved.length
+					? [
+							h("span.dot.warn"),
+							h("b", `${unsaved.length} change${unsaved.length > 1 ? "s" : ""} not saved`),
+							h("span.words.cut", { title: words }, words),
+						]
+					: quiet("All is as the file has it."),
+				h("span.grow"),
+				unsaved.length > 0 && send("Discard", "discard_taught"),
+				unsaved.length > 0 &&
+					!why &&
+					send("Save", "save_taught", { label: `Save in ${file}`, main: true }),
+			),
 		form(
 			{ "data-send": "copy_taught" },
 			h(

@@ -16,7 +16,7 @@ import { factsOf, has, many, size, titleOf, when, whereabouts } from "./words.js
 function lostRecording(moved) {
 	/** @type {Server.RecordingInfo | null} */
 	let now = null;
-	const why = h("span.cut");
+	const why = h("span");
 	const refused = h("p", { role: "alert", hidden: true });
 	const place = h("input.field", {
 		placeholder: "folder where it lies now",
@@ -61,7 +61,7 @@ function lostRecording(moved) {
 			if (recording?.id !== now?.id) complain("");
 			now = recording;
 			element.hidden = !recording?.missing || recording.id === null;
-			write(why, `${recording?.missing ?? ""}. Its runs stay readable.`);
+			write(why, `Its runs stay readable, but ${recording?.missing}.`);
 		},
 	};
 }

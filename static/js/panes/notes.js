@@ -80,19 +80,13 @@ export function mountNotes(root, { store, actions, retry }) {
 					[
 						server?.changed.length ? button("Reset all parameters", () => actions.reset()) : null,
 						button("Try again", actions.runAgain),
-						close(() => {
-							dismissed = run.key;
-							render();
-						}),
+						close(() => ((dismissed = run.key), render())),
 					],
 				),
 			);
 		}
 		const odd = [...(server?.sequence?.warnings ?? []), ...(run?.warnings ?? [])].join(". ");
-		const hide = () => {
-			heard = odd;
-			render();
-		};
+		const hide = () => ((heard = odd), render());
 		if (odd && odd !== heard) all.push(note("warn", "Worth knowing", odd, [close(hide)]));
 		// What takes back an edit says so while that is the last one.
 		const current = notes.filter(
@@ -119,8 +113,11 @@ export function mountNotes(root, { store, actions, retry }) {
 		}
 		// A run tells ten times a second how far it is: what stands there stays, or the button under a
 		// pointer would be another before it is let go.
-		const whose = [run?.state === "failed" && run.key, ...notes.map(({ id }) => id)];
-		const now = [...whose, ...all.map(({ outerHTML }) => outerHTML)].join();
+		const now = [
+			run?.state === "failed" && run.key,
+			...notes.map(({ id }) => id),
+			...all.map(({ outerHTML }) => outerHTML),
+		].join();
 		if (now !== standing) {
 			const held = root.contains(document.activeElement);
 			fill(root, all);

@@ -108,44 +108,37 @@ export function mountTop(root, { store, actions }) {
 
 	function lists() {
 		const { server, sequences, schema, link } = store.get();
+		const recording = server?.sequence;
 		// What is shown, until another is there in its place.
-		const open = server?.sequence?.name ?? server?.opening?.name ?? "";
-		const option = (
-			/** @type {Server.SequenceEntryInfo} */ { name, description, cameras, frames, kind, error },
-		) => {
-			const size = error
-				? "cannot be read"
-				: cameras && frames
-					? `${cameras} cameras, ${frames} steps`
-					: kind;
+		const open = recording?.name ?? server?.opening?.name ?? "";
+		// Its own name need not be that of its folder.
+		const shown = sequences.find(({ name, folder }) =>
+			recording ? folder === recording.folder : name === open,
+		);
+		const option = (/** @type {Server.SequenceEntryInfo} */ entry) => {
+			const { name, description, cameras, frames, kind, error } = entry;
+			const size = error ? "cannot be read" : frames ? `${cameras} cameras, ${frames} steps` : kind;
 			// The chosen one stands in the bar, where its name is enough.
 			return h(
 				"option",
 				{ value: name, title: error ?? description },
-				name === open ? name : `${name}  ·  ${size}`,
+				entry === shown ? open : `${name}  ·  ${size}`,
 			);
 		};
-		const group = (
-			/** @type {string} */ label,
-			/** @type {Server.SequenceEntryInfo[]} */ entries,
-		) => entries.length > 0 && h("optgroup", { label }, entries.map(option));
+		/** @param {string} label @param {string} kind */
+		const group = (label, kind) => {
+			const entries = sequences.filter((one) => one.kind === kind);
+			return entries.length > 0 && h("optgroup", { label }, entries.map(option));
+		};
 		refill(
 			sequence,
-			!open && h("option", { value: "", disabled: true }, "choose a sequence"),
-			open && !sequences.some(({ name }) => name === open) && h("option", { value: open }, open),
-			group(
-				"Built-in rooms",
-				sequences.filter(({ kind }) => kind === "rendered"),
-			),
-			group(
-				"Folders",
-				sequences.filter(({ kind }) => kind !== "rendered"),
-			),
+			!shown && h("option", { value: open, disabled: !open }, open || "choose a sequence"),
+			group("Built-in rooms", "rendered"),
+			group("Folders", "folder"),
 		);
-		sequence.value = open;
-		sequence.disabled = link !== "open" || sequences.length === 0;
-		const size = server?.sequence;
-		write(facts, size ? `${size.cameras.length} cameras · ${size.fps} Hz` : "");
+		sequence.value = shown?.name ?? open;
+		sequence.disabled = link !== "open" || !sequences.length;
+		write(facts, recording ? `${recording.cameras.length} cameras · ${recording.fps} Hz` : "");
 		for (const [key, select] of Object.entries(methods)) {
 			const now = server?.parameters[key] ?? "";
 			const names = schema?.methods[key] ?? [];
@@ -162,7 +155,7 @@ export function mountTop(root, { store, actions }) {
 			);
 			select.title = unfit[now] ?? "";
 			select.value = now;
-			select.disabled = link !== "open" || !size;
+			select.disabled = link !== "open" || !recording;
 		}
 	}
 

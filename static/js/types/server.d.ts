@@ -1214,6 +1214,8 @@ declare namespace Server {
 		name: string;
 		description: string;
 		kind: "rendered" | "folder";
+		/** That of what is open: the name of a recording need not be that of its folder. */
+		folder: string;
 		cameras: number | null;
 		frames: number | null;
 		/** Why it cannot be opened. */
@@ -1227,6 +1229,7 @@ declare namespace Server {
 		name: string;
 		/** The name or folder that opens it again. */
 		opened_as: string;
+		folder: string;
 		description: string;
 		fps: number;
 		frames: number;

@@ -432,7 +432,7 @@ def test_presets_of_ones_own_are_taken_by_name(
     assert taken == [current]
     status, _, stderr = run("batch", crossing, "--preset", "magic")
     assert status == 2
-    assert "--preset: expected one of robust, published, tuned, other, got 'magic'" in stderr
+    assert '--preset: expected one of robust, published, tuned, other, found "magic"' in stderr
     gone = next(iter(REMOVED))
     keep_preset(tmp_path / "presets.json", "tuned", {P_D: 0.9, gone: 1.0})
     with_values(RunParameters(), command.changes())

@@ -16,6 +16,7 @@ from tracker.export.reading import read_tracks
 from tracker.library.store import Library
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
+from tracker.sequences.reader import WHERE_NOW
 
 
 @pytest.fixture
@@ -126,7 +127,7 @@ def test_tracks_leave_without_the_folder_of_their_recording(
         status, _, err = run(*line, "--library", path)
         assert status == 1
         assert f"in {gone} any more" in err
-        assert "Library and name its new folder under Find…" in err
+        assert WHERE_NOW in err
 
 
 def test_a_run_is_not_exported_under_an_unknown_ending(

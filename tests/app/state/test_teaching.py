@@ -30,7 +30,7 @@ from tracker.corrections.log import read_log
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.reader import FILE, read_sequence
+from tracker.sequences.reader import FILE, WHERE_NOW, read_sequence
 from tracker.sequences.writing.teaching import taught_values
 
 BOX = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
@@ -379,7 +379,8 @@ def test_a_file_that_another_program_changed_is_told(client: TestClient, walkers
     command(client, "set_room_face", side="max", axis=0, value=1.5)
     assert "sequence.toml changed or vanished" in done(client)["run"]["warnings"][0]
     file.rename(walkers / "away")
-    assert panel(client)["remark"] == f"{file} is not there any more: put it back."
+    words = f"There is no sequence.toml in {walkers} any more; {WHERE_NOW}."
+    assert panel(client)["remark"] == words
 
 
 def test_a_rendered_room_is_offered_as_a_copy(

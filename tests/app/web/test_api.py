@@ -91,6 +91,7 @@ def test_sequences_lists_the_data_folder(client: TestClient, data: Path) -> None
         broken.rmdir()
     assert listed["crossing"]["kind"] == "folder"
     assert listed["crossing"]["error"] is None
+    assert listed["crossing"]["folder"] == client.get("/api/state").json()["sequence"]["folder"]
     assert listed["room44-3p"]["kind"] == "rendered"
     assert "sequence.toml" in listed["broken"]["error"]
 

@@ -22,7 +22,7 @@ from tracker.corrections import Correction
 from tracker.corrections.log import own_place, read_log, write_log
 from tracker.review.queue import Alternative, Queue, ReviewItem
 from tracker.review.queue.item import TrackRows, propose
-from tracker.sequences.reader import read_sequence
+from tracker.sequences.reader import WHERE_NOW, read_sequence
 
 PLACE = "/api/corrections"
 
@@ -98,7 +98,7 @@ def test_in_a_folder_that_is_gone_nothing_is_corrected_and_nothing_is_lost(
     ):
         answer = command(desk, name, **fields)
         assert answer.status_code in (409, 422), name
-        assert f"{own} is not there any more" in answer.json()["detail"]
+        assert f"here is no sequence.toml in {own} any more; {WHERE_NOW}" in answer.json()["detail"]
     assert [c["id"] for c in desk.get(PLACE).json()["corrections"]] == [before[0]["id"]]
     assert not own_place(own).exists()
     assert not own.exists()

@@ -16,12 +16,12 @@ from app.web import running
 from app.web.dependencies import Settings
 from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, is_evaluated, run_is, wait_until
-from tests.library.runs import made_by_the_version_before
+from tests.library.runs import made_by_the_version_before, tracks
 from tests.library.runs import run as made
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import record_of_recording
 from tracker.library.store import Library
-from tracker.sequences.reader import read_sequence
+from tracker.sequences.reader import WHERE_NOW, read_sequence
 
 P_D = "fusion.detection_probability"
 
@@ -140,6 +140,30 @@ def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_p
         shown = client.post(f"/api/library/runs/{number}/open").json()
         wait_until(lambda: client.get("/api/state").json()["run"]["kept"] == number)
         assert "detail" not in shown
+
+
+def test_what_was_not_saved_goes_where_the_recording_went(
+    data: Path, path: Path, tmp_path: Path
+) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    shutil.copytree(data / "crossing", before)
+    with application(data, path, str(before)) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        (recording,) = [
+            r for r in client.get("/api/library").json()["recordings"] if r["place"] == str(before)
+        ]
+        face = {"side": "max", "axis": 1}
+        assert command(client, "set_room_face", **face, value=2.5).status_code == 204
+        before.rename(after)
+        address = f"/api/library/recordings/{recording['id']}/place"
+        assert client.post(address, json={"place": str(after)}).status_code == 200
+        # what was opened before is still open, from where it was
+        assert command(client, "set_room_face", **face, value=2.25).status_code == 204
+        assert client.post("/api/sequence", json={"name": str(after)}).status_code == 200
+        wait_until(lambda: client.get("/api/state").json()["sequence"]["opened_as"] == str(after))
+        assert client.get("/api/state").json()["teaching"]["unsaved"] == 1
+        assert client.get("/api/state").json()["sequence"]["room"]["max"][1] == 2.25
+        assert command(client, "save_taught").status_code == 204
 
 
 @pytest.mark.full
@@ -338,6 +362,23 @@ def test_a_kept_run_is_pinned_beside_the_shown_one(kept: TestClient) -> None:
     wait_until(lambda: kept.get("/api/evaluation/comparison").status_code == 200)
     comparison = kept.get("/api/evaluation/comparison").json()
     assert comparison["against"] == "pinned"
+
+
+def test_a_run_that_cannot_be_pinned_says_why(data: Path, path: Path, tmp_path: Path) -> None:
+    gone, there = tmp_path / "gone", data / "numbers"
+    of_gone = replace(record_of_recording(read_sequence(there), ""), place=str(gone))
+    with Library(path) as library:
+        library.keep(of_gone, made(1))
+        library.keep(replace(of_gone, place=str(there)), made(2, kept=tracks(9, 2, cameras=7)))
+    with application(data, path, str(there)) as client:
+        answer = client.post("/api/library/runs/1/pin")
+        assert answer.status_code == 422
+        assert answer.json()["detail"] == f"There is no sequence.toml in {gone} any more."
+        assert answer.json()["hint"].lower() == f"{WHERE_NOW}.".lower()
+        answer = client.post("/api/library/runs/2/pin")
+        assert "of 7 cameras, and numbers has" in answer.json()["detail"]
+        # of what cannot be opened the page hears by another way
+        assert answer.json()["code"] != "cannot_open"
 
 
 @pytest.mark.full

@@ -7,10 +7,11 @@ import re
 import time
 from pathlib import Path
 
+import httpx2
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import ask
+from tests.browser.looking import ask, still
 from tests.browser.serving import Server
 from tracker.export.registry import FORMATS
 
@@ -204,10 +205,15 @@ def test_a_folder_that_cannot_be_found_is_told_where_it_was_asked_for(
     moved = folder.with_name("elsewhere")
     folder.rename(moved)
     try:
+        library.set_viewport_size({"width": 1280, "height": 720})
         library.reload()
         place = library.get_by_role("textbox", name="Folder where the recording lies now")
+        button = library.get_by_role("button", name="Find…")
+        above = still(library.get_by_text("Its runs stay readable"))
+        assert above["y"] + above["height"] <= still(place)["y"]
+        assert abs(still(place)["y"] - still(button)["y"]) < 6, "they are in one row"
         place.fill(str(folder.with_name("nowhere")))
-        library.get_by_role("button", name="Find…").click()
+        button.click()
         refused = library.get_by_role("region", name="Runs").get_by_role("alert")
         expect(refused).to_contain_text("there is no such folder")
         expect(place).to_have_value(str(folder.with_name("nowhere")))
@@ -217,6 +223,31 @@ def test_a_folder_that_cannot_be_found_is_told_where_it_was_asked_for(
     library.get_by_role("button", name="Find…").click()
     expect(place).to_be_hidden()
     expect(refused).to_be_hidden()
+
+
+COVERED = """() => {
+    const over = document.querySelector(".notes").getBoundingClientRect();
+    return [...document.querySelectorAll(".lib :is(button, input, select)")]
+        .filter((one) => one.checkVisibility())
+        .filter((one) => {
+            const { left, right, top, bottom } = one.getBoundingClientRect();
+            return left < over.right && right > over.left && top < over.bottom && bottom > over.top;
+        })
+        .map((one) => one.ariaLabel ?? one.textContent);
+}"""
+
+
+def test_notes_cover_nothing_that_can_be_pressed_in_the_lowest_window(
+    library: Page, server: Server
+) -> None:
+    library.set_viewport_size({"width": 1280, "height": 720})
+    expect(library.get_by_role("img", name="Ways from above")).to_be_visible()
+    for number in range(4):
+        name = f"/recordings/of a hall with a name that takes several lines of a note/and {number}"
+        answer = httpx2.post(f"{server.address}api/sequence", json={"name": name}, timeout=30.0)
+        assert answer.status_code == 422
+    expect(library.locator(".note")).to_have_count(4)
+    assert library.evaluate(COVERED) == []
 
 
 def test_a_run_is_pinned_as_a(library: Page, server: Server) -> None:

@@ -362,6 +362,12 @@ def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: 
     sheet.get_by_label("Path").press("Enter")
     expect(sheet).not_to_be_visible()
     server.wait(lambda now: now["sequence"]["opened_as"].endswith("others"))
+    # in the bar's list it is once, though its name is not that of its folder
+    listed = page.get_by_role("combobox", name="Sequence")
+    expect(listed).to_have_value("others")
+    expect(listed.locator("option:checked")).to_have_text("numbers")
+    every = server.get("/api/sequences").json()["sequences"]
+    expect(listed.locator("option")).to_have_count(len(every))
     page.keyboard.press("Control+o")
     expect(sheet.get_by_label("Find by name")).to_have_value("")
     page.keyboard.press("Escape")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 import re
 import tomllib
 from collections.abc import Callable
@@ -35,6 +36,25 @@ def drag(page: Page, begin: tuple[float, float], end: tuple[float, float], pause
         page.wait_for_timeout(pause // 4)
     page.wait_for_timeout(pause)
     page.mouse.up()
+
+
+def test_a_remark_on_the_file_leaves_saving_in_sight(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    page.set_viewport_size({"width": 1280, "height": 720})
+    file = Path(server.get("/api/state").json()["sequence"]["folder"]) / FILE
+    before, status = file.read_bytes(), file.stat()
+    server.command("set_room_face", side="max", axis=1, value=1.75)
+    try:
+        file.write_bytes(before + b"# by hand\n")
+        page.get_by_role("tab", name="Teach").click()
+        remark = page.get_by_text("was changed by another program")
+        expect(remark).to_be_in_viewport(ratio=1.0)
+        expect(page.get_by_role("button", name="Discard")).to_be_in_viewport(ratio=1.0)
+        expect(page.get_by_role("button", name="Save in")).to_be_in_viewport(ratio=1.0)
+    finally:
+        file.write_bytes(before)
+        os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+        server.command("discard_taught")
 
 
 def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(

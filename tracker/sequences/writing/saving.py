@@ -20,10 +20,17 @@ import tomlkit
 from tomlkit.items import AoT
 
 from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder, write_whole
-from tracker.files.folders import cache_folder, is_missing
+from tracker.files.folders import cache_folder
 from tracker.sequences.built_in import built_in_name
 from tracker.sequences.errors import SequenceError
-from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
+from tracker.sequences.reader import (
+    FILE,
+    WHERE_NOW,
+    check_own_file,
+    given_folder,
+    read_sequence,
+    why_missing,
+)
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import (
     FACES,
@@ -47,8 +54,8 @@ def why_not_in_place(folder: Path) -> str | None:
         return f"{folder.name} comes with the program and is never written to"
     if folder.is_relative_to(cache_folder()):
         return f"{folder.name} lies in the cache, which may be emptied at any time"
-    if is_missing(folder):
-        return f"{folder} is not there any more"
+    if why := why_missing(folder):
+        return why
     if not os.access(folder, os.W_OK) or not os.access(folder / FILE, os.W_OK):
         return f"{folder} is a place that you may only read"
     return None
@@ -65,7 +72,7 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         The path of the backup.
 
     Raises:
-        SequenceError: If the folder is gone, the file may not be written, or its room, target or
+        SequenceError: If the folder was moved, the file may not be written, or its room, target or
             templates were changed meanwhile by another program; it is then unchanged.
     """
     folder, where = sequence.folder, f"{sequence.folder.name}/{FILE}"
@@ -145,16 +152,13 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
 
 
 def _check_there(folder: Path, where: str) -> None:
-    """Check that the folder of a sequence still exists, before anything is written.
+    """Check that a sequence is still in its folder, before anything is written.
 
     Raises:
         SequenceError: If it was moved or deleted.
     """
-    if is_missing(folder):
-        raise SequenceError(
-            f"{where}: cannot be saved, since {folder} is not there any more; put the folder back, "
-            "then save again"
-        )
+    if why := why_missing(folder):
+        raise SequenceError(f"{where}: cannot be saved, since {why}; {WHERE_NOW}")
 
 
 def _check_place(folder: Path, source: Path) -> None:
