@@ -346,7 +346,8 @@ export function mountOpening({ store, actions }) {
 		const types = target.matches("input");
 		// The field is left, for what is typed in is not written over.
 		if (key === "Enter" && types) {
-			const open = target.id === "open-path" && target.form.querySelector("button");
+			const open =
+				target.form?.querySelector("button") ?? (target.value && one(".rec:not([hidden])", dialog));
 			target.blur();
 			open && (open.focus(), open.click());
 		}

@@ -115,10 +115,10 @@ export function mountTop(root, { store, actions }) {
 		) => {
 			const size = error
 				? "cannot be read"
-				: cameras && frames
-					? `${cameras} cameras, ${frames} steps`
+				: frames
+					? `${cameras} camera${cameras === 1 ? "" : "s"}, ${frames} steps`
 					: kind;
-			// The chosen one stands in the bar, where its name is enough.
+			// Of the chosen one its name is enough.
 			return h(
 				"option",
 				{ value: name, title: error ?? description },
