@@ -61,8 +61,9 @@ def why_no_tracks(run: Run) -> str | None:
         view.detections is not None and len(view.detections.frames) for view in run.sequence.views
     ):
         return (
-            f"no tracks: the files of boxes hold no box of the steps 0 … {run.sequence.frames - 1}; "
-            "see detections and detections_first_frame in sequence.toml"
+            "no tracks: the files of boxes hold no box of the steps "
+            f"0 … {run.sequence.frames - 1}; see detections and detections_first_frame in "
+            "sequence.toml"
         )
     n = count_stages(run)
     gate = decisive_gate(run) if n.frames else None
