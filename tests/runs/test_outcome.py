@@ -8,9 +8,14 @@ from pathlib import Path
 import pytest
 
 from tests.runs.test_gates import film
+from tests.synthetic import write_lines, write_sequence
 from tracker.parameters.catalogue import RunParameters
-from tracker.runs.outcome import StageCounts, _losing_stage
+from tracker.runs import pipeline
+from tracker.runs.fitting import default_parameters
+from tracker.runs.gates import notices
+from tracker.runs.outcome import StageCounts, _losing_stage, why_no_tracks
 from tracker.runs.run import Run
+from tracker.sequences.reader import read_sequence
 
 ALL = StageCounts(frames=100, found=1000, passed=20, together=5, begun=3, surest=0.4, tracks=0)
 
@@ -39,3 +44,16 @@ def test_the_first_stage_without_output_is_named(
     views = sequence.views * cameras
     run = Run(replace(sequence, views=views), RunParameters(), 0, {})
     assert words in _losing_stage(run, replace(ALL, **counts))
+
+
+def test_files_without_a_box_are_named_and_no_value_is_blamed(tmp_path: Path) -> None:
+    folder = write_sequence(tmp_path / "empty", frames=4, container=None, detections=True)
+    for view in read_sequence(folder).views:
+        write_lines(folder / f"{view.camera.name}.csv", "frame,left,top,width,height,score", [])
+    sequence = read_sequence(folder)
+    run = pipeline.compute(sequence, default_parameters(sequence))
+    assert why_no_tracks(run) == (
+        "no tracks: the files of boxes hold no box of the steps 0 … 3; "
+        "see detections and detections_first_frame in sequence.toml"
+    )
+    assert notices(run) == []

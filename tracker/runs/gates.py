@@ -157,7 +157,7 @@ def notices(run: Run) -> list[str]:
     """Describe in sentences how people were detected where that needs attention.
 
     The counts of all cameras are described if the run has no tracks, else those of cameras that
-    passed no box on.
+    passed no box on; none where no camera had a candidate.
     """
     found = []
     gates = count_gates(run)
@@ -193,5 +193,6 @@ def notices(run: Run) -> list[str]:
                 "still"
             )
     untracked = not len(run.tracks.ids)
-    found += [str(one) for one in gates if untracked or one.passed == 0.0]
+    if any(one.candidates for one in gates):
+        found += [str(one) for one in gates if untracked or one.passed == 0.0]
     return found

@@ -57,6 +57,14 @@ def why_no_tracks(run: Run) -> str | None:
     of stage 1 fell; None if the run has tracks."""
     if len(run.tracks):
         return None
+    if not run.from_pictures and not any(
+        view.detections is not None and len(view.detections.frames) for view in run.sequence.views
+    ):
+        return (
+            "no tracks: the files of boxes hold no box of the steps "
+            f"0 … {run.sequence.frames - 1}; see detections and detections_first_frame in "
+            "sequence.toml"
+        )
     n = count_stages(run)
     gate = decisive_gate(run) if n.frames else None
     return _losing_stage(run, n) + (f"; in the cameras {gate}" if gate is not None else "")

@@ -5,6 +5,7 @@
 import { claim, all, choices, h, icon, parts, show, svg, write } from "../elements/dom.js";
 import { fixed, signButton, symbolParts } from "../elements/drawn.js";
 import { fetcher, getJson } from "../state/api.js";
+import { keyOf } from "../state/commands.js";
 
 /** @typedef {Server.ParameterInfo} Parameter */
 
@@ -229,6 +230,12 @@ export function mountParameters(root, { store, actions }) {
 					...called,
 					onchange: () => enter(of),
 					onkeydown: (/** @type {KeyboardEvent} */ event) => {
+						const turn = /** @type {any} */ ({ "Ctrl+z": -1, "Ctrl+Shift+z": 1 })[keyOf(event)];
+						// What was entered is a value, and no text that the browser takes back.
+						if (turn && field.value === field.defaultValue) {
+							claim(event);
+							actions.undo(turn);
+						}
 						if (event.key !== "Escape") return;
 						event.stopPropagation();
 						field.value = written(now(key));

@@ -110,6 +110,8 @@ function shelf(on) {
 		title: "A recording, a run or a note",
 		"aria-label": "Find",
 		oninput: () => on.find(),
+		// Escape empties it without an input.
+		onchange: () => on.find(),
 	});
 	const orders = Object.keys(ORDERS).map((word) => [word, word]);
 	const order = chooser("Sort recordings by", orders, orders[0][0], on.find);

@@ -166,7 +166,11 @@ export function runsTable(on) {
 		key: (run) => run.id,
 		by: "When",
 		down: true,
-		choose: on.focus,
+		// Arrows go on from the row that was clicked.
+		choose: (run, { currentTarget }) => {
+			/** @type {HTMLElement} */ (currentTarget).focus();
+			on.focus(run);
+		},
 		open: on.open,
 		attributes: (run) => ({ "data-run": run.id }),
 	});

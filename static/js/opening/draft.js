@@ -41,7 +41,7 @@ function head(info) {
 	const { files_there, files_used, frames, cameras, fps, wish, phase } = info;
 	const used = `${files_used} of ${many(files_there, "file")} used`;
 	const facts = frames
-		? `Hz, ${rateOrigin(info)} · ${cameras.length} cameras · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used}`
+		? `Hz, ${rateOrigin(info)} · ${many(cameras.length, "camera")} · ${many(frames, "step")} · ${(frames / fps).toFixed(1)} s · ${used}`
 		: files_there
 			? many(files_there, "file")
 			: "";
@@ -114,7 +114,7 @@ function stateOf(info, { ready, open, known }) {
 			: known
 				? `nothing to decide, ${many(known, "thing")} to look at`
 				: "nothing to decide";
-	return `${ready} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
+	return `${ready} of ${many(info.cameras.length, "camera")} ready, ${things}. Nothing is written before you import.`;
 }
 
 /** @param {Server.ImportInfo} info */

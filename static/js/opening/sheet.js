@@ -124,6 +124,14 @@ export function mountOpening({ store, actions }) {
 		const known = await getJson("/api/recordings");
 		if (info) return;
 		draw([...startSheet(known), trouble && h("p.s-foot.say", { role: "alert" }, trouble)]);
+		seek();
+	}
+
+	/** Only the recordings whose words hold what is sought are shown. */
+	function seek() {
+		const { value } = one("#open-find", dialog);
+		for (const card of all(".rec", dialog))
+			card.hidden = !card.textContent?.toLowerCase().includes(value.toLowerCase());
 	}
 
 	/** @param {Server.ImportInfo} next */
@@ -166,7 +174,10 @@ export function mountOpening({ store, actions }) {
 		const held = document.activeElement;
 		// Whoever types or drags is not disturbed: what he does is sent when he has done it.
 		const wide = dialog.classList.contains("wide");
-		const types = held instanceof HTMLInputElement && held.value !== held.defaultValue;
+		const types =
+			held instanceof HTMLInputElement &&
+			held.id !== "open-find" &&
+			held.value !== held.defaultValue;
 		if ((dialog.contains(held) && types) || one("[data-held]", dialog)) return;
 		// Another sheet begins at itself: its buttons are no others' successors.
 		if (dialog.classList.toggle("wide", Boolean(info)) !== wide && dialog.open) dialog.focus();
@@ -337,16 +348,16 @@ export function mountOpening({ store, actions }) {
 		(/** @type {any} */ { target }) => target.dataset.wish && wish(wishOf(target)),
 	);
 	dialog.addEventListener("input", (/** @type {any} */ { target }) => {
-		if (target.id !== "open-find") return;
-		for (const card of all(".rec", dialog))
-			card.hidden = !card.textContent?.toLowerCase().includes(target.value.toLowerCase());
+		if (target.id === "open-find") seek();
 	});
 	dialog.addEventListener("keydown", (/** @type {any} */ event) => {
 		const { target, key } = event;
 		const types = target.matches("input");
-		// The field is left, for what is typed in is not written over.
-		if (key === "Enter" && types) {
-			const open = target.id === "open-path" && target.form.querySelector("button");
+		if (key === "Enter" && target.id === "open-find") {
+			if (target.value) one(".rec:not([hidden])", dialog)?.click();
+		} else if (key === "Enter" && types) {
+			// The field is left, for what is typed in is not written over.
+			const open = target.form?.querySelector("button");
 			target.blur();
 			open && (open.focus(), open.click());
 		}

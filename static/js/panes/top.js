@@ -117,8 +117,11 @@ export function mountTop(root, { store, actions }) {
 		);
 		const option = (/** @type {Server.SequenceEntryInfo} */ entry) => {
 			const { name, description, cameras, frames, kind, error } = entry;
-			const size = error ? "cannot be read" : frames ? `${cameras} cameras, ${frames} steps` : kind;
-			// The chosen one stands in the bar, where its name is enough.
+			const size = error
+				? "cannot be read"
+				: frames
+					? `${cameras} camera${cameras === 1 ? "" : "s"}, ${frames} steps`
+					: kind;
 			return h(
 				"option",
 				{ value: name, title: error ?? description },

@@ -128,6 +128,15 @@ def test_finding_leaves_what_matches(library: Page) -> None:
     library.keyboard.type("no such run")
     expect(library.locator("tr[data-run]:visible")).to_have_count(0)
     expect(library.get_by_text("No run matches")).to_be_visible()
+    library.keyboard.press("Escape")
+    expect(library.locator("tr[data-run]:visible")).to_have_count(2)
+
+
+def test_arrows_go_on_from_the_run_that_was_clicked(library: Page) -> None:
+    rows = library.locator("tr[data-run]")
+    rows.first.locator("td").nth(2).click()
+    library.keyboard.press("ArrowDown")
+    expect(rows.nth(1)).to_be_focused()
 
 
 def test_runs_stand_side_by_side(library: Page, server: Server) -> None:

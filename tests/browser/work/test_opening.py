@@ -369,9 +369,14 @@ def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: 
     every = server.get("/api/sequences").json()["sequences"]
     expect(listed.locator("option")).to_have_count(len(every))
     page.keyboard.press("Control+o")
-    expect(sheet.get_by_label("Find by name")).to_have_value("")
-    page.keyboard.press("Escape")
+    find = sheet.get_by_label("Find by name")
+    expect(find).to_have_value("")
+    find.fill("room44")  # before the list is there, or after
+    expect(sheet.locator(".rec", has_text="room44-3p")).to_be_visible()
+    expect(own.first).to_be_hidden()
+    find.press("Enter")  # the first that is found
     expect(sheet).not_to_be_visible()
+    server.wait(lambda now: now["sequence"]["name"] == "room44-3p")
 
 
 def test_keys_that_are_pressed_again_while_the_sheet_is_read_open_it(flat_page: Page) -> None:

@@ -61,6 +61,24 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     as_at_first(server)
 
 
+def test_what_was_entered_is_undone_in_its_field(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.get_by_role("tab", name="Parameters").click()
+    field = page.locator(f'[id="value-{P_D}"]')
+    before = field.input_value()
+    field.fill("0.8")
+    page.keyboard.press("Enter")
+    server.wait(lambda state: state["parameters"][P_D] == 0.8)
+    page.keyboard.press("Control+z")
+    server.wait(lambda state: state["parameters"][P_D] == float(before))
+    expect(field).to_have_value(before)
+    expect(field).to_be_focused()
+    page.keyboard.press("Control+Shift+z")
+    server.wait(lambda state: state["parameters"][P_D] == 0.8)
+    as_at_first(server)
+
+
 MOST_AT_FIRST = 60
 """Requests that open a recording whose run is there: the page, its style sheets and modules, 3D,
 the step that is shown in all cameras, lanes, figures and what is in doubt."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import short
-from tests.mistakes import MISTAKES
+from tests.mistakes import MISTAKES, y_up
 from tests.random_rooms import random_room
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
@@ -108,6 +108,23 @@ def test_boxes_of_nobody_prove_nothing() -> None:
     found = find_reading(raw_cameras(sequence), noise, fps=sequence.fps)
     assert found is not None
     assert found.kind == "none"
+
+
+def test_boxes_of_which_hardly_any_meet_tell_no_axis() -> None:
+    """Six steps of a world with y up are right, and all boxes after them anywhere."""
+    sequence, rng = y_up(random_room(2, steps=300)), np.random.default_rng(2)
+    views = []
+    for view in sequence.views:
+        own = view.detections
+        assert own is not None
+        wrong = own.frames >= 6
+        boxes = own.boxes.copy()
+        boxes[wrong, :2] = rng.uniform(0.0, view.camera.image_size, (int(wrong.sum()), 2))
+        views.append(replace(view, detections=replace(own, boxes=boxes)))
+    judged = judge_boxes(replace(sequence, views=tuple(views)))
+    assert judged is not None
+    assert judged.chosen.consensus.agreeing > 50
+    assert not judged.mistaken
 
 
 def test_too_few_boxes_are_no_reason_for_an_alarm() -> None:

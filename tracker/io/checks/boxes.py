@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.conventions.judge import (
@@ -142,10 +143,14 @@ def judge_boxes(sequence: Sequence, *, exchanges: bool = True) -> JudgedBoxes | 
         unit = "m"  # as tall as the file says
     up = upwards(chosen.consensus.rise)
     reading = replace(chosen.reading, unit=unit, up=up)
-    agreed = mistaken or chosen.consensus.agreeing >= LEAST_AGREEING
+    agreed = mistaken or _agrees(chosen.consensus)
     right = reading == AS_GIVEN and agreed
     suggestion = suggest(sequence.cameras, given.consensus) if right else None
     return JudgedBoxes(given, reading, chosen, agreed and reading != AS_GIVEN, verdict, suggestion)
+
+
+def _agrees(found: Consensus) -> bool:
+    return found.agreeing >= LEAST_AGREEING and found.share >= LEAST_SHARE
 
 
 def _fits(height: float, known: float) -> bool:
@@ -173,7 +178,7 @@ def check_boxes(sequence: Sequence, judged: JudgedBoxes | None) -> Iterator[Chec
         yield _mistake(sequence, judged)
         return
     agreed = judged.given.consensus
-    if agreed.agreeing < LEAST_AGREEING or agreed.share < LEAST_SHARE:
+    if not _agrees(agreed):
         yield _nothing_meets(judged)
         return
     gap = float(np.median(agreed.gaps)) * agreed.height
