@@ -118,6 +118,8 @@ def test_who_is_not_there_is_meant_where_the_way_leads() -> None:
     alone = TrackIndex(steps, places, np.array([4, 5, 6]))
     assert alone.nearest(Place(4, 3.0, 0.5, 1.0), leeway=1) == 2
     assert alone.nearest(Place(4, 3.5 + ABOVE, 0.0, 1.0), leeway=1) is None
+    repeated = TrackIndex(np.array([2, 2]), places[:2], np.array([4, 4]))  # no time, no pace
+    assert repeated.nearest(Place(3, 1.0, 0.0, 1.0), leeway=1) == 1
 
 
 def test_here_means_who_is_at_the_place_and_else_whom_it_names() -> None:
