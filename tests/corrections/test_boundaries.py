@@ -610,6 +610,9 @@ def test_a_correction_speaks_of_its_places() -> None:
     assert one.words == "exchanged from here, steps 3 – 6"
     same, different = (make(kind=kind, places=[at(1), at(4)]) for kind in ("same", "different"))
     assert same.constraints == Constraints(must_link=(same.places,))
+    earlier, later = same.places
+    assert not same.constraints.mapped({earlier: 1})
+    assert same.constraints.mapped({earlier: 1, later: 2}).must_link == ((1, 2),)
     assert different.constraints == Constraints(cannot_link=(different.places,))
     own = frozenset({Place(*at(7))})
     assert make(kind="came", places=[at(7)]).constraints == Constraints(firsts=own)
@@ -671,6 +674,9 @@ def test_two_logs_are_merged_by_time_and_only_then_by_id() -> None:
     gone = difference(first, second)
     assert (gone.only_first, gone.only_second) == (tuple(first), tuple(second))
     assert not gone.empty
+    assert not difference(first, ()).empty
+    assert not difference((), first).empty
+    assert difference(first, first).empty
     changed = told["b"].model_copy(update={"note": "other"})
     assert difference(first, [changed, *first[1:]]).changed == ((told["b"], changed),)
     assert not difference(first, [changed, *first[1:]]).empty

@@ -206,6 +206,8 @@ def test_notes_count_in_words() -> None:
     )
     assert evaluate(None, tracks, steps=1).notes[0].startswith("There is no truth")
     assert evaluate(ONE, tracks_of([])).notes == ()
+    assert evaluate(ONE, tracks_of([])).has_truth
+    assert not evaluate(None, tracks).has_truth
 
 
 def test_as_many_steps_as_either_side_has_are_scored() -> None:
