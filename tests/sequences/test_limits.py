@@ -241,11 +241,13 @@ def test_a_table_has_a_largest_number_and_a_largest_size(
 ) -> None:
     assert table(tmp_path, "a\n1000000\n-1e6\n").values["a"].tolist() == [1e6, -1e6]
     assert table(tmp_path, "a\n10\n", largest=10.0).values["a"].tolist() == [10.0]
+    one_by_one = table(tmp_path, "a,b\n10,\n", blank=("b",), largest=10.0)
+    assert one_by_one.values["a"].tolist() == [10.0]
     assert refused(lambda: table(tmp_path, "a\n10.5\n", largest=10.0))
     for name, fits, more in (
         ("MOST_ROWS", "a\n1\n2\n3\n", "a\n1\n2\n3\n4\n"),
         ("MOST_COLUMNS", "a,b,c\n", "a,b,c,d\n"),
-        ("MOST_BYTES", "a\n", "a\n1\n"),
+        ("MOST_BYTES", "a\n\n", "a\n1\n"),
     ):
         with monkeypatch.context() as patch:
             patch.setattr(csv_columns, name, 3)
