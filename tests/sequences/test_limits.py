@@ -16,7 +16,8 @@ from tracker.sequences import csv_columns
 from tracker.sequences.clock import Clock, read_timing
 from tracker.sequences.csv_columns import Columns, guarded, read_columns, unguarded
 from tracker.sequences.errors import SequenceError
-from tracker.sequences.fields import Fields, did_you_mean, is_number, listed
+from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, is_number, listed
+from tracker.sequences.reader import LONGEST_PATH, given_folder
 from tracker.sequences.sequence import Room, View
 from tracker.sequences.tables import BoxTable, truth_of
 from tracker.sequences.views import POSE, check_view_of_room, read_camera
@@ -430,3 +431,12 @@ def test_a_range_of_steps_that_is_none_is_refused(tmp_path: Path, part: str) -> 
         return
     with pytest.raises(SequenceError, match="line 1: steps: expected ranges like"):
         truth_of(file, "truth.csv", 3)
+
+
+def test_a_folder_may_have_the_longest_name_and_path() -> None:
+    longest = "/".join(["x" * 99] * 40)
+    assert len(longest) + 1 == LONGEST_PATH
+    for path in ("x" * LONGEST_NAME, f"x{longest}"):
+        assert given_folder(path) == Path(path)
+        with pytest.raises(SequenceError, match="expected a path of at most"):
+            given_folder(f"x{path}")
