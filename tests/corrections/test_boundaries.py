@@ -118,6 +118,8 @@ def test_who_is_not_there_is_meant_where_the_way_leads() -> None:
     alone = TrackIndex(steps, places, np.array([4, 5, 6]))
     assert alone.nearest(Place(4, 3.0, 0.5, 1.0), leeway=1) == 2
     assert alone.nearest(Place(4, 3.5 + ABOVE, 0.0, 1.0), leeway=1) is None
+    repeated = TrackIndex(np.array([2, 2]), places[:2], np.array([4, 4]))  # no time, no pace
+    assert repeated.nearest(Place(3, 1.0, 0.0, 1.0), leeway=1) == 1
 
 
 def test_here_means_who_is_at_the_place_and_else_whom_it_names() -> None:
@@ -157,7 +159,7 @@ def test_nobody_is_along_its_places_from_the_first_step_to_the_last(
     ("told", "refused"),
     [
         # two places of one step within 0.3 m are one person's
-        ([("same", at(1), at(5)), ("different", at(1, 0.29), at(5))], True),
+        ([("same", at(1), at(5)), ("different", at(1, 0.3), at(5, 0.3))], True),
         ([("same", at(1), at(5)), ("different", at(1, 0.31), at(5))], False),
         ([("same", at(1), at(5)), ("different", at(2), at(5))], False),
         # of one person they are less than 2 m apart at a step
@@ -321,6 +323,7 @@ def test_a_name_is_the_later_one_that_is_met() -> None:
         ([(0, 3), (5, 6), (8, 9)], [at(2), at(9)], 8),
         ([(0, 3), (5, 9)], [at(4), at(7)], 7),  # the gap before the first place is none of its own
         ([(0, 2), (4, 9)], [at(2), at(4)], 4),
+        ([(0, 2), (4, 9)], [at(2), at(6)], 4),  # he leaves right after the first place
     ],
 )
 def test_a_track_rests_on_a_join_from_where_it_holds(
@@ -395,6 +398,16 @@ def test_checked_steps_are_joined_where_none_lies_between(
         ([(1, 0, 5), (2, 6, 8)], ("same", at(5), at(6, 5.0)), {1: [1] * 6, 2: [1] * 3}),
         # while both are there neither ends: each turns into the other where they are nearest
         ([(1, 0, 6), (2, 3, 9)], ("same", at(1), at(8, 5.0)), {1: [2] * 3 + [1] * 4, 2: [2] * 7}),
+        ([(1, 0, 5), (2, 5, 9)], ("same", at(3), at(7, 5.0)), {1: [1] * 5 + [3], 2: [1] * 5}),
+        # and where one goes on after a gap, it gives way as well
+        ([(1, 0, 3), (1, 8, 9), (2, 5, 9)], ("same", at(3), at(7, 5.0)),
+         {1: [2] * 4 + [1] * 2, 2: [2] * 5}),
+        # both miss a step of it, and the rows that are meant do not go forward
+        ([(1, 0, 8), (1, 10, 12), (2, 0, 9), (2, 11, 12)],
+         ("exchanged", at(9), at(9, 5.0), at(10, 5.0), at(10)), {1: [1] * 12, 2: [2] * 12}),
+        # the first of the numbers may be the later one; two that mean one step stay two
+        ([(2, 0, 3), (1, 4, 9)], ("same", at(3, 5.0), at(4)), {1: [1] * 6, 2: [1] * 4}),
+        ([(1, 4, 9), (2, 0, 4)], ("same", at(3), at(4, 5.0)), {1: [1] * 6, 2: [2] * 5}),
         # parted from the later place on
         ([(1, 0, 9)], ("different", at(3), at(4)), {1: [2] * 4 + [1] * 6}),
         ([(1, 0, 3)], ("different", at(3), at(4)), {1: [1] * 3 + [2]}),  # both mean its last row
@@ -488,7 +501,7 @@ def test_a_ray_must_go_down_to_a_floor_below_the_camera() -> None:
             foot_on_floor(camera, tuple(pixel.tolist()), floor=floor, half_height=0.9)
 
 
-@pytest.mark.parametrize(("apart", "refused"), [(0.495, False), (0.505, True)])
+@pytest.mark.parametrize(("apart", "refused"), [(0.495, False), (0.5, False), (0.505, True)])
 def test_rays_that_miss_each_other_by_half_a_metre_show_two_points(
     apart: float, refused: bool
 ) -> None:
@@ -597,6 +610,9 @@ def test_a_correction_speaks_of_its_places() -> None:
     assert one.words == "exchanged from here, steps 3 – 6"
     same, different = (make(kind=kind, places=[at(1), at(4)]) for kind in ("same", "different"))
     assert same.constraints == Constraints(must_link=(same.places,))
+    earlier, later = same.places
+    assert not same.constraints.mapped({earlier: 1})
+    assert same.constraints.mapped({earlier: 1, later: 2}).must_link == ((1, 2),)
     assert different.constraints == Constraints(cannot_link=(different.places,))
     own = frozenset({Place(*at(7))})
     assert make(kind="came", places=[at(7)]).constraints == Constraints(firsts=own)
@@ -658,6 +674,9 @@ def test_two_logs_are_merged_by_time_and_only_then_by_id() -> None:
     gone = difference(first, second)
     assert (gone.only_first, gone.only_second) == (tuple(first), tuple(second))
     assert not gone.empty
+    assert not difference(first, ()).empty
+    assert not difference((), first).empty
+    assert difference(first, first).empty
     changed = told["b"].model_copy(update={"note": "other"})
     assert difference(first, [changed, *first[1:]]).changed == ((told["b"], changed),)
     assert not difference(first, [changed, *first[1:]]).empty

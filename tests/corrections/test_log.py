@@ -117,6 +117,7 @@ SAME = LOG[LOG.index("[[correction]]") : LOG.rindex("[[correction]]")]
         (LOG.replace("format = 1", "# a word\nformat = 3"), "line 2: expected format = 1, found 3"),
         ("format = 1\ncorrection = 3\n", r"line 2: expected tables \[\[correction"),
         (LOG.replace("time =", 'id = "a"\ntime ='), "line 12: id: .* found a again"),
+        ('correction = [{kind = "hear"}]', "line 1: kind: expected one of same, .* found 'hear'"),
         (LOG + "\n" + SAME.replace("same", "different"), "line 16: .* contradicts"),
         ("a = " + "[" * 3000, "expected a few levels"),
     ],

@@ -61,6 +61,11 @@ def test_what_says_nothing_of_a_place_is_refused() -> None:
         triangulate([one])
     with pytest.raises(CorrectionError, match="same side"):
         triangulate([one, one])
+    # the second shows the first camera itself, which cannot have a picture of that
+    cameras = [world.look_at("a", (-4.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+               world.look_at("b", (-4.0, -4.0, 1.0), (-4.0, 0.0, 1.0))]  # fmt: skip
+    with pytest.raises(CorrectionError, match="two different points"):
+        triangulate([(camera, (639.5, 399.5)) for camera in cameras])
 
 
 @pytest.mark.parametrize(("angle", "refused"), [(0.03, True), (0.05, False), (0.2, False)])

@@ -30,6 +30,8 @@ def at(distance: float):
 def test_the_gate_itself_is_within_the_gate(distance: float, paired: int) -> None:
     scene = at(distance)
     assert len(match(scene)) == paired
+    assert (result := hota(scene)) is not None
+    assert result.within_gate == paired
     assert int(clear(scene).tracked.sum()) == paired
     assert identity(scene).true_positives == paired
     assert identity(scene).track_of.tolist() == [0 if paired else -1]
@@ -204,6 +206,8 @@ def test_notes_count_in_words() -> None:
     )
     assert evaluate(None, tracks, steps=1).notes[0].startswith("There is no truth")
     assert evaluate(ONE, tracks_of([])).notes == ()
+    assert evaluate(ONE, tracks_of([])).has_truth
+    assert not evaluate(None, tracks).has_truth
 
 
 def test_as_many_steps_as_either_side_has_are_scored() -> None:
@@ -280,9 +284,14 @@ def test_a_person_is_fragmented_once_for_each_gap() -> None:
     assert score.present.tolist() == [7, 7]
 
 
-@pytest.mark.parametrize(("uncertain", "ignored"), [(0.49, True), (0.51, False)])
-def test_an_uncertain_position_counts_as_twice_as_far(uncertain: float, ignored: bool) -> None:
-    truth = truth_of([(0, 1, 1.0, 0, 0), (0, 2, -uncertain, 0, 0)], valid=[True, False])
+@pytest.mark.parametrize(
+    ("certain", "uncertain", "ignored"),
+    [(1.0, 0.49, True), (1.0, 0.51, False), (1.5, 0.74, True), (1.5, 0.76, False)],
+)
+def test_an_uncertain_position_counts_as_twice_as_far(
+    certain: float, uncertain: float, ignored: bool
+) -> None:
+    truth = truth_of([(0, 1, certain, 0, 0), (0, 2, -uncertain, 0, 0)], valid=[True, False])
     result = evaluate(truth, tracks_of([(0, 5, 0.0, 0, 0)]), EvaluationSettings(gate=1.5))
     assert result.series.ignored.tolist() == [int(ignored)]
     assert result["misses"] == int(ignored)

@@ -90,6 +90,10 @@ def test_compare():
     by_key = {row.definition.key: row for row in compare(rough, other)}
     assert not by_key["mota"].comparable
     assert by_key["found_share"].comparable
+    nothing = evaluate(truth, perturbed(truth, 1, missing=1.0, swaps=0, false=0))
+    by_key = {row.definition.key: row for row in compare(fine, nothing)}
+    undefined = by_key["position_error"]
+    assert (undefined.b, undefined.difference, undefined.verdict) == (None, None, "undefined")
 
 
 @pytest.mark.parametrize(

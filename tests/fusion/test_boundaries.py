@@ -599,7 +599,7 @@ def test_bounds_are_the_room_its_margin_and_what_is_below_the_floor(
 def test_components_that_boxes_made_are_gathered_from_the_last_camera_to_the_first() -> None:
     """Cardinality and the first two moments stay; of each group the heaviest names it."""
     rng = np.random.default_rng(4)
-    sources = np.array([[0, 1, 1, 0, -1, -1], [2, -1, -1, 2, 0, -1]])
+    sources = np.array([[0, 1, 1, 0, -1, -1], [0, -1, -1, 0, 2, -1]])
     mixture = GaussianMixture(rng.uniform(0.1, 1.0, 6), rng.normal(size=(6, 3)),
                               np.tile(0.1 * np.eye(3), (6, 1, 1)), np.arange(6))  # fmt: skip
     nothing = np.zeros((2, 6))

@@ -12,6 +12,7 @@ from numpy import ndarray
 
 from tests.fusion.rooms import NO_BOXES, Step, empty_room, exact, filtered
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion import reidentification
 from tracker.fusion.memory import Memory, recall
 from tracker.fusion.model import FusionModel
 from tracker.fusion.multi_bernoulli import MultiBernoulli
@@ -208,6 +209,12 @@ def test_without_pictures_nobody_is_known_by_looks() -> None:
 def test_people_who_look_alike_keep_their_labels() -> None:
     names = watched(IdentityBeliefs.none(), [1, 2], [EITHER, EITHER], 200)
     assert names.owners.tolist() == [-1, -1]
+
+
+def test_of_two_tracks_that_look_like_one_person_neither_is_named() -> None:
+    beliefs = np.log([[0.99, 0.01], [0.99, 0.01], [0.01, 0.99]])
+    found = reidentification._recognise(beliefs, own=np.log(9.0), odds=np.log(9.0))
+    assert found == [(2, 1)]
 
 
 def test_a_track_is_named_once_the_odds_are_twenty_to_one() -> None:

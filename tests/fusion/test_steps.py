@@ -426,6 +426,7 @@ def test_every_step_reports_what_made_it(method: Method) -> None:
         assert ((chances >= 0.0) & (chances <= p.detection_probability)).all()
         assert ((result.source_weights >= 0.0) & (result.source_weights <= 1.0 + 1e-9)).all()
         assert not result.source_weights[result.sources < 0].any()
+        assert result.source_weights[result.sources >= 0].all()
         assert (posterior.weights >= 0.0).all()
         if size:
             assert np.linalg.eigvalsh(posterior.covariances).min() > 0.0

@@ -22,9 +22,12 @@ from tracker.geometry.calibration import (
     LARGEST_ENTRY,
     LARGEST_SIDE,
     LEAST_FOCAL,
+    ROTATION_TOLERANCE,
     check_focal_lengths,
     checked_intrinsics,
+    checked_rotation,
     checked_size,
+    is_rotation,
 )
 from tracker.geometry.camera import NEAREST_DEPTH, Camera, stacked
 from tracker.kernels import lens
@@ -347,6 +350,17 @@ def test_a_picture_has_a_whole_number_of_pixels_from_one_to_the_largest() -> Non
         for size in ([wrong, 9.0], [9.0, wrong]):
             with pytest.raises(ValueError, match="expected two whole numbers of pixels"):
                 checked_size(np.array(size))
+
+
+def test_a_rotation_may_be_off_by_its_tolerance() -> None:
+    sheared = np.eye(3)
+    sheared[0, 1] = ROTATION_TOLERANCE
+    assert is_rotation(sheared)
+    assert checked_rotation(sheared) is sheared
+    sheared[0, 1] *= 1.001
+    assert not is_rotation(sheared)
+    with pytest.raises(ValueError, match="expected a rotation"):
+        checked_rotation(sheared)
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,9 @@ from tracker.sequences.csv_columns import Columns
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields
 from tracker.sequences.filling import check_missing, find_room, find_time
+from tracker.sequences.pictures import video
 from tracker.sequences.pictures.media import PictureProperties, check_pictures
-from tracker.sequences.pictures.video import VideoIndex, index_video
+from tracker.sequences.pictures.video import VideoError, VideoIndex, index_video
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, OpenedFiles
 from tracker.sequences.views import Source, read_views
@@ -264,6 +265,34 @@ def written(path: Path, codec: str, fps: float, frames: int) -> VideoIndex:
     return index_video(path)
 
 
+@pytest.mark.parametrize(
+    ("times", "claimed", "rate"),
+    [
+        ([0], 25.0, 25.0),
+        ([0], 0.0, None),
+        ([0], 1000.0, None),
+        ([0, 100_000], 0.0, 10.0),
+        ([0, 1001], 1000.0, 999.001),
+        ([0, 1001], 999.0, 999.0),
+    ],
+)
+def test_a_header_may_claim_a_rate_above_0_and_below_1000(
+    times: list[int], claimed: float, rate: float | None
+) -> None:
+    assert video._rate(np.array(times), claimed) == rate
+
+
+@pytest.mark.parametrize(("limit", "most"), [("LARGEST_COUNT", 5), ("MOST_PIXELS", 64 * 48)])
+def test_a_video_at_a_limit_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, most: int
+) -> None:
+    monkeypatch.setattr(video, limit, most)
+    assert written(tmp_path / "a.avi", "MJPG", 25.0, 5).frames == 5
+    monkeypatch.setattr(video, limit, most - 1)
+    with pytest.raises(VideoError, match=r"expected .*at most"):
+        written(tmp_path / "b.avi", "MJPG", 25.0, 5)
+
+
 @pytest.mark.parametrize("fps", [25.0, 590.0])
 def test_of_one_frame_the_header_says_the_rate(tmp_path: Path, fps: float) -> None:
     index = written(tmp_path / "a.avi", "MJPG", fps, 1)
@@ -278,7 +307,8 @@ def test_a_videos_rate_and_frames_are_counted(tmp_path: Path, fps: float) -> Non
         assert index.fps == pytest.approx(fps, rel=1e-4)
         if index.times is not None:
             assert_allclose(index.times / 1e6, np.arange(30) / fps, atol=2e-3)
-        assert index.keys[0] == 0
+        # what is coded by differences begins anew every 12 frames
+        assert index.keys.tolist() == list(range(0, 30, 12 if codec == "mp4v" else 1))
 
 
 @pytest.mark.parametrize(("claimed", "spacing", "found"), [(25, 100.0, 10.0), (30, 1e3 / 30, 30.0)])

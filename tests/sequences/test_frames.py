@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+import shutil
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -18,7 +20,8 @@ from hypothesis import strategies as st
 from tests.app.conftest import wait_until
 from tests.synthetic import CODECS, Container, number_in, numbered_picture, write_sequence
 from tracker.sequences.pictures import frames as frames_module
-from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.pictures import video as video_module
+from tracker.sequences.pictures.frames import NEAR, FrameReader
 from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
 from tracker.sequences.reader import read_sequence
 
@@ -106,6 +109,12 @@ def test_steps_that_do_not_exist_have_no_picture(reader: FrameReader) -> None:
             reader.picture(camera, 0)
 
 
+def test_a_file_may_go_on_after_the_last_step(folders: dict[str, Path]) -> None:
+    with FrameReader(replace(read_sequence(folders["images"]), frames=20)) as reader:
+        assert number_at(reader, 0, 19) == FIRST + 19
+        assert reader.picture(0, 20) is None
+
+
 def test_cameras_are_not_mixed_up(reader: FrameReader) -> None:
     first, second = reader.picture(0, 5), reader.picture(1, 5)
     assert first is not None
@@ -143,6 +152,7 @@ def test_memory_stays_within_its_bound(folders: dict[str, Path]) -> None:
             for picture in reader._cache._pictures.values()
             if picture is not None
         )
+        assert len(reader._cache._pictures) == 10
 
 
 def test_playing_is_read_ahead(folders: dict[str, Path]) -> None:
@@ -154,6 +164,37 @@ def test_playing_is_read_ahead(folders: dict[str, Path]) -> None:
         assert not reader._cache.has(0, 13 + frames_module.AHEAD)
         assert not reader._cache.has(1, 13)
         assert number_at(reader, 0, 20) == FIRST + 20
+
+
+@pytest.mark.parametrize(
+    ("steps", "direction", "ahead"),
+    [
+        ([20], 0, []),
+        ([20, 21], 1, [22, 23, 24]),
+        ([20, 20 + NEAR], 1, [25, 26, 27]),
+        ([20, 21 + NEAR], 0, []),
+        ([20, 21, 21], 0, [22, 23, 24]),  # a step that is shown again changes nothing
+        ([20, 21, 20], -1, []),
+        ([20, 20 - NEAR], -1, []),
+        ([20, 19 - NEAR], 0, []),
+        ([56, 57], 1, [58, 59]),  # the last step
+    ],
+)
+def test_only_who_goes_on_by_a_few_steps_plays(
+    steps: list[int], direction: int, ahead: list[int]
+) -> None:
+    walk = frames_module._Walk()
+    assert [walk.move(step, 60, 3) for step in steps][-1] == direction
+    assert list(iter(walk.take, None)) == ahead
+
+
+def test_pictures_before_a_step_are_kept_where_steps_go_back_alone(
+    folders: dict[str, Path],
+) -> None:
+    with FrameReader(read_sequence(folders["images"])) as reader:
+        for step, kept in ((40, False), (20, False), (19, True)):
+            number_at(reader, 0, step)
+            assert reader._cache.has(0, step - 1) is kept
 
 
 def test_closing_ends_the_thread_and_may_happen_twice(folders: dict[str, Path]) -> None:
@@ -221,6 +262,15 @@ def test_broken_and_misfit_images_are_missing(tmp_path: Path) -> None:
     assert read_image(tmp_path / "empty.jpg") is None
 
 
+def test_a_picture_file_has_at_most_so_many_bytes(
+    folders: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = next(folders["images"].rglob("*.jpg"))
+    for smaller in (0, 1):
+        monkeypatch.setattr(video_module, "LARGEST_IMAGE", path.stat().st_size - smaller)
+        assert (read_image(path) is None) == smaller
+
+
 @pytest.mark.parametrize("kept", [0.3, 0.7])
 @pytest.mark.parametrize("container", ["mjpg.avi", "xvid.avi"])
 def test_a_file_cut_short_is_counted_not_believed(
@@ -244,13 +294,28 @@ def test_times_that_cannot_be_trusted_are_not(folders: dict[str, Path]) -> None:
     assert index.times is not None
     # a file whose time stamps turn out to say something else than its index
     late, early = (np.concatenate([index.times[:40], index.times[40:] + by]) for by in (1, -1))
-    for times, keys in ((late, index.keys), (early, index.keys), (None, np.zeros(1, dtype=int))):
+    last = np.append(index.times[:-1], index.times[-1] - 1)
+    none = np.zeros(1, dtype=int)
+    for times, keys in (
+        (late, index.keys), (early, index.keys), (last, index.keys), (None, none)
+    ):  # fmt: skip
         doubtful = type(index)(index.path, index.size, index.frames, times, keys)
         with VideoDecoder(doubtful) as decoder:
             for frame in [2, 39, 60, 41, 90, 0, 96, 50]:
                 picture = decoder.read(frame)
                 assert picture is not None
                 assert number_in(picture) == frame
+
+
+def test_two_frames_of_one_time_are_counted(
+    folders: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = Path(shutil.copy(folders["mp4"] / "cam1.mp4", tmp_path))
+    stamps, keys = video_module._scan(path)
+    stamps[-1] = stamps[-2]
+    monkeypatch.setattr(video_module, "_scan", lambda _: (stamps, keys))
+    index = index_video(path)
+    assert (index.times, index.frames) == (None, len(stamps))
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"RIFF\x00\x00\x00\x00AVI LIST", bytes(5000)])

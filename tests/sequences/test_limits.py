@@ -16,7 +16,8 @@ from tracker.sequences import csv_columns
 from tracker.sequences.clock import Clock, read_timing
 from tracker.sequences.csv_columns import Columns, guarded, read_columns, unguarded
 from tracker.sequences.errors import SequenceError
-from tracker.sequences.fields import Fields, did_you_mean, is_number, listed
+from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, is_number, listed
+from tracker.sequences.reader import LONGEST_PATH, given_folder
 from tracker.sequences.sequence import Room, View
 from tracker.sequences.tables import BoxTable, truth_of
 from tracker.sequences.views import POSE, check_view_of_room, read_camera
@@ -241,11 +242,13 @@ def test_a_table_has_a_largest_number_and_a_largest_size(
 ) -> None:
     assert table(tmp_path, "a\n1000000\n-1e6\n").values["a"].tolist() == [1e6, -1e6]
     assert table(tmp_path, "a\n10\n", largest=10.0).values["a"].tolist() == [10.0]
+    one_by_one = table(tmp_path, "a,b\n10,\n", blank=("b",), largest=10.0)
+    assert one_by_one.values["a"].tolist() == [10.0]
     assert refused(lambda: table(tmp_path, "a\n10.5\n", largest=10.0))
     for name, fits, more in (
         ("MOST_ROWS", "a\n1\n2\n3\n", "a\n1\n2\n3\n4\n"),
         ("MOST_COLUMNS", "a,b,c\n", "a,b,c,d\n"),
-        ("MOST_BYTES", "a\n", "a\n1\n"),
+        ("MOST_BYTES", "a\n\n", "a\n1\n"),
     ):
         with monkeypatch.context() as patch:
             patch.setattr(csv_columns, name, 3)
@@ -428,3 +431,12 @@ def test_a_range_of_steps_that_is_none_is_refused(tmp_path: Path, part: str) -> 
         return
     with pytest.raises(SequenceError, match="line 1: steps: expected ranges like"):
         truth_of(file, "truth.csv", 3)
+
+
+def test_a_folder_may_have_the_longest_name_and_path() -> None:
+    longest = "/".join(["x" * 99] * 40)
+    assert len(longest) + 1 == LONGEST_PATH
+    for path in ("x" * LONGEST_NAME, f"x{longest}"):
+        assert given_folder(path) == Path(path)
+        with pytest.raises(SequenceError, match="expected a path of at most"):
+            given_folder(f"x{path}")

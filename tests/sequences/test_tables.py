@@ -11,7 +11,7 @@ from numpy import ndarray
 from tests.synthetic import write_sequence
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.tables import regular_gap
+from tracker.sequences.tables import regular_gap, truth_of
 
 
 def test_a_gap_between_frames_is_decided_at_a_thousand_to_one() -> None:
@@ -79,3 +79,13 @@ def test_vectors_are_read_block_after_block(tmp_path: Path) -> None:
     np.save(folder / "cam1.npy", values)
     with pytest.raises(SequenceError, match=r"in row 4103 \(counted from 0\)"):
         read_sequence(folder)
+
+
+def test_rows_from_the_first_step_after_the_sequence_on_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "truth.csv"
+    path.write_text("frame,id,x,y,z\n" + "".join(f"{k},1,0,0,1\n" for k in range(4)))
+    for frames, said in ((4, []), (3, ["truth: 1 of 4 rows are left out: of steps after 2"])):
+        notes: list[str] = []
+        truth = truth_of(path, "truth", frames, notes)
+        assert truth.frames.tolist() == list(range(frames))
+        assert [note.split(",")[0] for note in notes] == said

@@ -51,8 +51,8 @@ class _Segments:
         self.following[number] = new
         self.of_row[rows[place:]] = new
 
-    def nearest(self, one: int, other: int, after: int, until: int) -> int | None:
-        """Find the step at which two segments are nearest to each other on the ground.
+    def turn(self, one: int, other: int, after: int, until: int) -> int:
+        """Find the step from which the second of two segments follows the first.
 
         Args:
             one: Index of the first segment.
@@ -61,7 +61,8 @@ class _Segments:
             until: Last step of the search.
 
         Returns:
-            The step; None where the segments have none in common.
+            The step at which they are nearest to each other on the ground; where they have none
+            in common, the first of the second segment.
         """
         own, others = (
             rows[(self.frames[rows] > after) & (self.frames[rows] <= until)]
@@ -71,7 +72,7 @@ class _Segments:
             self.frames[own], self.frames[others], return_indices=True
         )
         if not len(steps):
-            return None
+            return int(self.frames[others].min(initial=until))
         ground = self.positions[:, :2]
         apart = np.hypot(*(ground[own[at]] - ground[others[there]]).T)
         return int(steps[np.argmin(apart)])
@@ -91,13 +92,6 @@ class _Segments:
         way = np.hypot(*np.diff(self.positions[own, :2], axis=0).T)
         return int(own[1 + np.argmax(way)])
 
-    def cut_from(self, number: int, step: int) -> int:
-        """Split a segment at a step, and return the index of the second part."""
-        rows = self.rows[number]
-        row = int(rows[np.searchsorted(self.frames[rows], step)])
-        self.cut(row)
-        return int(self.of_row[row])
-
     def before(self, number: int) -> int:
         """Return the segment that a segment follows, -1 for none."""
         return self.following.index(number) if number in self.following else -1
@@ -114,9 +108,7 @@ class _Segments:
         self.following[earlier] = later
 
     def chain(self, number: int) -> list[int]:
-        """Return the segments of the track that a segment is in, in the order of time."""
-        while (earlier := self.before(number)) >= 0:
-            number = earlier
+        """Return a segment and those that follow it, in the order of time."""
         found = [number]
         while (number := self.following[number]) >= 0:
             found.append(number)
@@ -174,7 +166,8 @@ def relabel(
 def _link(segments: _Segments, one: Correction) -> None:
     """Link the tracks at the places of one person, for a correction *same* or *exchanged*.
 
-    Tracks that exist at the same time are split at the step at which they are nearest.
+    Tracks that exist at the same time are split at the step at which they are nearest; nothing is
+    linked where the places refer to rows that do not go forward in time.
     """
     found = [(segments.row_at(a), segments.row_at(b)) for a, b in one.constraints.must_link]
     if any(a is None or b is None for a, b in found):
@@ -182,26 +175,22 @@ def _link(segments: _Segments, one: Correction) -> None:
     pairs: list[tuple[int, int]] = [(a, b) for a, b in found if a is not None and b is not None]
     if len({segments.of_row[b] for _, b in pairs}) < len(pairs):
         return  # both places refer to one segment
+    after = int(segments.frames[[a for a, _ in pairs]].max())
+    until = int(segments.frames[[b for _, b in pairs]].min())
     joins = []
     for a, b in pairs:
         earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
         if later in segments.chain(earlier):
             continue  # they are one track already
-        if not segments.frames[a] < segments.frames[b]:
+        if after >= until:
             return
-        # where both exist at the same time, they are exchanged where they are nearest
-        turn = segments.nearest(
-            earlier, later, int(segments.frames[[a for a, _ in pairs]].max()),
-            int(segments.frames[[b for _, b in pairs]].min()),
-        )  # fmt: skip
-        joins.append((a, b, turn))
+        joins.append((a, b, segments.turn(earlier, later, after, until)))
     for a, b, turn in joins:
-        if turn is not None:
-            for row in (a, b):
-                number = int(segments.of_row[row])
-                own = segments.frames[segments.rows[number]]
-                if own[0] < turn <= own[-1]:
-                    segments.cut_from(number, turn)
+        for row in (a, b):
+            rows = segments.rows[segments.of_row[row]]
+            rest = rows[segments.frames[rows] >= turn]
+            if len(rest):
+                segments.cut(int(rest[0]))
     for a, b, _ in joins:
         earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
         if later not in segments.chain(earlier):

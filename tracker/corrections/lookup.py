@@ -80,7 +80,7 @@ class TrackIndex:
         for step in range(first, last + 1):
             own = self.at(step)
             where = along(correction.places, step)
-            if own.start < own.stop and where is not None:
+            if where is not None:
                 near = np.hypot(*(self._ground[own] - where).T) <= around
                 found[self._order[own]] = near
         return found
@@ -134,4 +134,4 @@ def mostly_inside(
     along_it = np.bincount(owners[inside], minlength=count)
     lengths = np.bincount(owners, minlength=count)
     touches = (along_it == 1) & (lengths > 1) & (first < last)
-    return set(np.flatnonzero((along_it > 0) & (2 * along_it > there) & ~touches).tolist())
+    return set(np.flatnonzero((2 * along_it > there) & ~touches).tolist())

@@ -210,7 +210,7 @@ def supporting_corrections(
         if later is not None:
             pairs = zip(one.places, one.places[later:], outcome.tracks[later:], strict=False)
             for earlier, place, track in pairs:
-                between = (ids == track) & (frames > earlier.step) & (frames <= place.step)
+                between = (ids == track) & (frames >= earlier.step) & (frames <= place.step)
                 begins.append((track, _after_last_gap(frames[between], place.step), one.id))
     begins.sort(key=lambda begin: begin[1])
     for track, step, name in begins:

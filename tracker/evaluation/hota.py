@@ -88,7 +88,7 @@ def hota(comparison: Comparison) -> Hota | None:
     for who, which, similarity in steps:
         rivals = similarity.sum(axis=0) + similarity.sum(axis=1)[:, None] - similarity
         aligned[np.ix_(who, which)] += np.divide(
-            similarity, rivals, out=np.zeros_like(similarity), where=rivals > _TINY
+            similarity, rivals, out=np.zeros_like(similarity), where=similarity > 0.0
         )
     alignment = aligned / np.maximum(present + reported - aligned, _TINY)
 

@@ -129,8 +129,7 @@ def _predict_lost(
             np.concatenate([missing.newer, np.full(len(away), first_label)]),
         )
     absent = [i for i, label in enumerate(missing.lost.labels.tolist()) if label not in there]
-    if len(absent) < missing.lost.size:
-        missing = missing.take(np.array(absent, dtype=np.int64))
+    missing = missing.take(np.array(absent, dtype=np.int64))
     lost = model.motion.predict(missing.lost, 1.0)
     recoverable = model.room.contains(lost.means[:, :3])
     recoverable &= missing.ages <= model.parameters.memory + 1e-9

@@ -53,6 +53,7 @@ def test_who_is_there_at_the_beginning_and_the_end_says_nothing() -> None:
 def test_a_track_that_is_lost_and_found_again_came_through_no_door() -> None:
     lost = (THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), (0, 200, (-2.0, 0.0), (0.0, 0.0)))
     assert found(*lost, (220, 399, (0.3, 0.0), (2.0, 0.0))) == []
+    assert found(*lost, (200, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)], "both are there"
     assert found(*lost, (230, 399, (0.3, 0.0), (2.0, 0.0))) == [], "a second and a half"
     assert found(*lost, (231, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)]
     # much later it is somebody else, who appears where one vanished: a door in the middle
@@ -64,6 +65,22 @@ def test_one_beginning_alone_counts_at_the_edge_only() -> None:
     assert found(THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), inside) == []
     edge = (100, 399, (3.2, 0.0), (1.0, 0.0))
     assert found(THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), edge) == [(3.2, 0.0, 1)]
+
+
+@pytest.mark.parametrize(
+    ("piece", "ends"),
+    [
+        ((10, 399, (3.2, 0.0), (1.0, 0.0)), 1),
+        ((9, 399, (3.2, 0.0), (1.0, 0.0)), 0),
+        ((0, 389, (1.0, 0.0), (3.2, 0.0)), 1),
+        ((0, 390, (1.0, 0.0), (3.2, 0.0)), 0),
+        ((100, 110, (3.2, 0.0), (3.2, 0.0)), 2),
+        ((100, 109, (3.2, 0.0), (3.2, 0.0)), 0),
+    ],
+)
+def test_half_a_second_is_long_enough(piece: Piece, ends: int) -> None:
+    across = (0, 399, (3.0, -3.0), (-3.0, 3.0))
+    assert found(THERE_ALREADY, across, piece) == ([(3.2, 0.0, ends)] if ends else [])
 
 
 def test_short_tracks_are_accidents() -> None:

@@ -117,3 +117,7 @@ def test_sides_and_turns_count_alike() -> None:
         heads, feet = sides(box, turn_of(np.array([*up, 0.1])))
         np.testing.assert_allclose(heads[0], head)
         np.testing.assert_allclose((heads + feet)[0] / 2.0, [25, 50])
+
+
+def test_a_camera_that_looks_straight_down_is_not_rolled() -> None:
+    assert turn_of(np.array([0.0, 0.0, -1.0])) == 0

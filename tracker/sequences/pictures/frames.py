@@ -241,8 +241,6 @@ class _Walk:
         self.last = step
         if 0 < distance <= NEAR:
             self.next_ahead = max(self.next_ahead, step + 1)
-            if self.next_ahead > step + ahead + 1:  # left over from elsewhere
-                self.next_ahead = step + 1
             self.end_ahead = min(step + 1 + ahead, frames)
             return 1
         if distance != 0:
