@@ -12,6 +12,8 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters.groups.smoothing import SmoothingParams
+from tracker.smoothing.tracklets import linking
+from tracker.smoothing.tracklets.appearance import Appearances
 from tracker.smoothing.tracklets.constraints import ConstraintResolver
 from tracker.smoothing.tracklets.costs import Rates
 from tracker.smoothing.tracklets.splitting import Splits, Tracked, find_splits, split_tracks
@@ -95,6 +97,14 @@ def test_where_a_path_goes_on_under_another_name_it_is_cut(
     found = find_splits(tracked(standing(), names=names), P)
     assert found.clear.all()
     assert not found.breaks.any()
+
+
+def test_a_gap_that_is_linked_over_is_filled_and_has_no_name() -> None:
+    gap = range(12, 18)
+    found = linking.link_tracks(tracked(standing(*gap)), P, Appearances())
+    assert len(found.paths.labels) == 1
+    assert np.flatnonzero(~found.had).tolist() == [*gap]
+    assert np.flatnonzero(found.names < 0).tolist() == [*gap]
 
 
 @pytest.mark.parametrize(("length", "seen", "cut_out"), [(6, False, True), (6, True, False)])
