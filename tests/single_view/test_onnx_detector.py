@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy import ndarray
-from onnx import TensorProto
+from onnx import TensorProto, helper
 
 from tests import world
 from tests.single_view.networks import answering, pooling, sized
@@ -270,6 +270,8 @@ def test_another_class_is_asked_for() -> None:
     assert found.scores.max() == pytest.approx(0.95)
     with pytest.raises(ValueError, match="tells 3 classes apart, and class 80 is asked for"):
         proposals({"output0": yolo_8()}, SIZE, 80)
+    with pytest.raises(ValueError, match="tells 3 classes apart, and class 3 is asked for"):
+        proposals({"output0": yolo_8()}, SIZE, 3)
 
 
 def test_scores_may_be_logits() -> None:
@@ -312,6 +314,8 @@ def test_a_table_of_another_grid_is_told_by_which_side_is_longer() -> None:
             proposals({"out": table_of(rows, columns)}, (320, 320))
     # the grid of YOLO with 80 classes and objectness, and with one class
     grid = 40 * 40 + 20 * 20 + 10 * 10
+    of_one = table_of(5, grid)
+    np.testing.assert_allclose(proposals({"out": of_one}, (320, 320)).scores, of_one[0, 4])
     with_objects = table_of(grid, 6)
     found = proposals({"out": with_objects}, (320, 320))
     np.testing.assert_allclose(found.scores, with_objects[0, :, 4] * with_objects[0, :, 5])
@@ -623,6 +627,10 @@ def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:
     ports = ports_of(path.read_bytes())
     assert [(p.name, p.shape) for p in ports.inputs] == [("images", (1, 3, 0, 0))]
     assert [(p.name, p.shape) for p in ports.outputs] == [("a", (1, 6, 84))]
+    # a size of -1, of ten bytes, is as open as one with a name
+    port = helper.make_tensor_value_info("b", TensorProto.FLOAT, [-1, 84])
+    model = helper.make_model(helper.make_graph([], "open", [port], [port]))
+    assert ports_of(model.SerializeToString()).outputs[0].shape == (0, 84)
 
 
 # ── as a method ──────────────────────────────────────────────────────────────

@@ -130,9 +130,7 @@ def test_the_longest_gap_is_two_seconds_and_the_fastest_goes_three_metres_in_one
 
 def test_who_comes_back_is_one_of_those_who_left() -> None:
     """By the label of the filter alone; by looks as likely as one of all who were gone."""
-    paths = standing(
-        (5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0), (8, 5, 8, 0.0)
-    )
+    paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0), (8, 5, 8, 0.0))
     chains = [[0], [1], [2], [3], [4]]
     found = costs.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))

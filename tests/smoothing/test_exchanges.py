@@ -122,3 +122,8 @@ def test_two_who_are_apart_for_longer_meet_anew(last: int, rows: list[int]) -> N
     one, other = np.array([0, 1, 0]), np.array([1, 0, 1])
     gains = np.array([1.0, 5.0, 4.0])
     assert _best_of_encounters(one, other, np.array([2, 3, last]), gains, 4) == rows
+
+
+def test_encounters_are_of_the_same_two() -> None:
+    one, other = np.array([0, 0, 1]), np.array([1, 2, 2])
+    assert _best_of_encounters(one, other, np.array([2, 3, 4]), np.ones(3), 4) == [0, 1, 2]

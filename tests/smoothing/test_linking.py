@@ -459,6 +459,8 @@ def pieces() -> tuple[Paths, ndarray]:
         (said("same", at(2), at(5)), []),  # one path is one person's already
         (said("same", at(9), at(14)), []),  # the one is gone when the other comes
         (said("different", at(2), at(5, 5.0)), []),
+        (said("different", at(2), at(5, 3.0)), []),
+        (said("same", at(2), at(5, 3.0)), []),
         (said("different", at(12), at(13)), []),  # both nearest to one row
         (said("name", at(4), name="Anna"), []),
         (said("here", at(4)), []),
