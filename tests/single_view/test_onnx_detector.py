@@ -332,6 +332,9 @@ def test_a_table_of_another_grid_is_told_by_which_side_is_longer() -> None:
         (("1", "2", "3"), [0.0, 2.0], [0.9, 0.4]),  # the whole numbers, of which one is above 1
         (("1", "3", "2"), [0.0, 2.0], [1.0, 0.0]),
         (("1", "2", "3"), [0.0, 7.0], [1.0, 1.0]),
+        # either may be of whole numbers up to 1
+        (("boxes", "labels", "3"), [0.0, 1.0], [1.0, 1.0]),
+        (("boxes", "classes", "3"), [0.0, 1.0], [1.0, 1.0]),
     ],
 )
 @pytest.mark.parametrize("first", ["labels", "scores"])
@@ -348,7 +351,33 @@ def test_lists_are_known_by_their_names_or_their_numbers(
     assert found.suppressed
 
 
+@pytest.mark.parametrize(
+    "lists",
+    [
+        {"2": [0.0, 1.0], "3": [1.0, 1.0]},  # which are the labels?
+        {"class_scores": [0.3, 1.0], "areas": [5.2, 1.5]},
+    ],
+)
+def test_lists_that_may_be_either_are_of_no_layout(lists: dict[str, list[float]]) -> None:
+    boxes = np.array([CORNERS, (8.0, 45.0, 16.0, 55.0)])
+    with pytest.raises(ValueError, match="of no known layout"):
+        proposals({"boxes": boxes, **{name: np.array(own) for name, own in lists.items()}}, SIZE)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "logits"), [(0.0, 1.0, False), (-1e-3, 1.0, True), (0.0, 1.001, True)]
+)
+def test_scores_below_0_or_above_1_are_logits(low: float, high: float, logits: bool) -> None:
+    table = table_of(300, 84)
+    table[0, :2, 4] = low, high
+    expected = 1.0 / (1.0 + np.exp(-table[0, :, 4])) if logits else table[0, :, 4]
+    found = proposals({"out": table}, (320, 320))
+    np.testing.assert_allclose(found.scores, expected, rtol=1e-5)
+
+
 def test_only_the_first_pictures_rows_of_a_list_count() -> None:
+    alone = np.array([[*CORNERS, 0.8, 0.0]])  # one row, and no picture
+    np.testing.assert_allclose(proposals({"out": alone}, SIZE).scores, [0.8])
     table = yolo_7_end_to_end()
     table[1] = 1.0, *CORNERS, 0.0, 0.8
     np.testing.assert_allclose(proposals({"out": table}, SIZE).scores, [0.9])
@@ -412,6 +441,9 @@ def test_peaks_of_a_map_are_the_highest_of_nine_and_two_hundred_at_most() -> Non
         expected = 4.0 * np.concatenate([centre - half, centre + half])
         np.testing.assert_allclose(corners, expected, rtol=1e-3, atol=1e-3)
     assert found.suppressed
+    for name in ("off", "reg"):
+        same = proposals({"hm": heat, name: offset, "wh": extent}, (320, 240), 1)
+        np.testing.assert_array_equal(same.corners, found.corners)
     with pytest.raises(ValueError, match="of no known layout"):
         proposals({"hm": heat[..., 1:], "wh": extent, "off": offset}, (320, 240))
 
@@ -631,6 +663,10 @@ def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:
     port = helper.make_tensor_value_info("b", TensorProto.FLOAT, [-1, 84])
     model = helper.make_model(helper.make_graph([], "open", [port], [port]))
     assert ports_of(model.SerializeToString()).outputs[0].shape == (0, 84)
+    for inputs, outputs in (([port], []), ([], [port])):
+        model = helper.make_model(helper.make_graph([], "half", inputs, outputs))
+        with pytest.raises(ValueError, match="without inputs or outputs"):
+            ports_of(model.SerializeToString())
 
 
 # ── as a method ──────────────────────────────────────────────────────────────
