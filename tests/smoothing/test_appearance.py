@@ -368,7 +368,12 @@ PEOPLE_STEP = 0.2
 FIRST, SECOND = [0.9, 0.1], [0.1, 0.9]
 
 
-def told(likenesses: list[list[float]], places: list[list[float]], weight: float = 1.0) -> ndarray:
+def told(
+    likenesses: list[list[float]],
+    places: list[list[float]],
+    weight: float = 1.0,
+    share: float = 1.0,
+) -> ndarray:
     """Of one piece whose boxes a camera shows, the first of the boxes of each step."""
     steps = len(likenesses)
     boxes = np.array([[x, 50.0, 5.0, 10.0] for own in places for x in own])
@@ -387,7 +392,7 @@ def told(likenesses: list[list[float]], places: list[list[float]], weight: float
     every[starts[:-1]] = likenesses
     piece = Paths.of([1], [0], [np.zeros((steps, 6))], [np.zeros((steps, 6, 6))], 6)
     rows = np.arange(steps)
-    links = Links(np.zeros(steps, dtype=np.int64), rows, starts[:-1].copy(), np.ones(steps))
+    links = Links(np.zeros(steps, dtype=np.int64), rows, starts[:-1].copy(), np.full(steps, share))
     return template_log_odds(piece, links, smoother, Appearances(None, [every]), weight)[0]
 
 
@@ -396,6 +401,9 @@ def test_boxes_of_ones_colours_count_by_the_time_that_they_last() -> None:
     own, other = (10 * PEOPLE_STEP * np.log(0.1 + 0.9 * 2.0 * p) for p in (0.9, 0.1))
     assert found == pytest.approx([0.0, other - own])
     assert told([FIRST] * 10, [[50.0]] * 10, 0.5) == pytest.approx(found / 2.0)
+    # and by how surely they are the own
+    assert told([FIRST] * 10, [[50.0]] * 10, share=0.8) == pytest.approx(0.8 * found)
+    assert not told([FIRST] * 10, [[50.0]] * 10, share=0.7).any()
 
 
 def test_boxes_that_look_now_like_one_and_now_like_the_other_tell_less_but_no_stranger() -> None:
