@@ -296,6 +296,7 @@ def test_a_step_leaves_the_state_before_as_it_was() -> None:
         ([10, 20, 24, 28, 60], 2),  # of equal growth the first
         ([40, 30, 20, 20], 3),  # it never grows: where it came to rest
         ([40, 30, 31, 20, 50], 2),
+        ([30, 30, 50, 60], 3),  # where it stands still it does not grow
         ([40], 0),
         ([0, 0], 1),
     ],

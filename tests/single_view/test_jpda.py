@@ -141,6 +141,15 @@ def test_measurements_can_go_on_instead_of_estimates() -> None:
     assert len(result.measurements) == 2
 
 
+@pytest.mark.parametrize("output", ["measurements", "estimates"])
+def test_who_is_not_confirmed_is_counted_and_not_reported(output: str) -> None:
+    steps: list = [[place, (100.0, 20.0)] for place in walking(3)]
+    results = track(steps, output=output, confirmation_steps=9)
+    assert [one.information["newcomers"] for one in results] == [2.0] * 3
+    for one in results:
+        assert not any(map(len, (one.boxes, one.estimates, one.labels, one.gates, one.events)))
+
+
 def test_the_gate_is_the_quantile_of_its_probability(monkeypatch: pytest.MonkeyPatch) -> None:
     squared, inside = [np.zeros(0)], [np.zeros(0, dtype=bool)]
     original = method.associate
@@ -407,6 +416,8 @@ TABLE = [
     ("close, not occluded", [[0.7, 0.2], [0.2, 0.7]], [0, 1], [-1, -1], [0, 0], [0, 0], [0, 0]),
     ("split", [[0.6, 0.35]], [0], [-1], [1], [0], [0, 0]),
     ("a piece of another's", [[0.6, 0.2], [0.0, 0.7]], [0, 1], [-1, -1], [0, 0], [0, 0], [0, 0]),
+    ("the likeliest event", [[0.4, 0.5], [0.0, 0.4]], [0, 1], [-1, -1], [1, 0], [0, 0], [0, 0]),
+    ("occluded in two", [[0.5, 0.3], [0.45, 0.0]], [0, -1], [0, 0], [0, 0], [0, 0], [0, 0]),
     ("nobody there", [], [], [], [], [], []),
     ("nothing measured", [[], []], [-1, -1], [-1, -1], [0, 0], [1, 1], []),
 ]
@@ -460,17 +471,19 @@ def test_of_a_split_target_what_lies_outside_its_box_is_somebody_new() -> None:
 
 
 def test_who_is_lost_in_a_piece_is_hidden_behind_its_owner() -> None:
-    # the second target's centre lies in the piece that the first one has
-    cases = read([[0.9], [0.0]], [0, -1])
-    found = search_components(
-        cases,
-        boxes((100, 100, 10, 20), (116, 98, 10, 20)),
-        boxes((100, 100, 10, 20)),
-        boxes((108, 100, 18, 22)),
-        LEAP,
-    )
-    assert_array_equal(found.shared, [0, 0])
-    assert not found.missed.any()
+    # the second target's centre lies in the piece that the first one has, alone or with another
+    for shares in ([[0.9], [0.0]], [[0.6, 0.35], [0.0, 0.0]]):
+        cases = read(shares, [0, -1])
+        found = search_components(
+            cases,
+            boxes((100, 100, 10, 20), (116, 98, 10, 20)),
+            boxes((100, 100, 10, 20), (100, 160, 10, 9))[: len(shares[0])],
+            boxes((108, 100, 18, 22), (100, 160, 10, 9))[: len(shares[0])],
+            LEAP,
+        )
+        assert_array_equal(found.shared, [0, 0])
+        assert not found.missed.any()
+        assert not found.split.any()
 
 
 def test_a_free_measurement_near_a_lost_target_is_its_own() -> None:

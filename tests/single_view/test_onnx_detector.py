@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy import ndarray
-from onnx import TensorProto
+from onnx import TensorProto, helper
 
 from tests import world
 from tests.single_view.networks import answering, pooling, sized
@@ -270,6 +270,8 @@ def test_another_class_is_asked_for() -> None:
     assert found.scores.max() == pytest.approx(0.95)
     with pytest.raises(ValueError, match="tells 3 classes apart, and class 80 is asked for"):
         proposals({"output0": yolo_8()}, SIZE, 80)
+    with pytest.raises(ValueError, match="tells 3 classes apart, and class 3 is asked for"):
+        proposals({"output0": yolo_8()}, SIZE, 3)
 
 
 def test_scores_may_be_logits() -> None:
@@ -312,6 +314,8 @@ def test_a_table_of_another_grid_is_told_by_which_side_is_longer() -> None:
             proposals({"out": table_of(rows, columns)}, (320, 320))
     # the grid of YOLO with 80 classes and objectness, and with one class
     grid = 40 * 40 + 20 * 20 + 10 * 10
+    of_one = table_of(5, grid)
+    np.testing.assert_allclose(proposals({"out": of_one}, (320, 320)).scores, of_one[0, 4])
     with_objects = table_of(grid, 6)
     found = proposals({"out": with_objects}, (320, 320))
     np.testing.assert_allclose(found.scores, with_objects[0, :, 4] * with_objects[0, :, 5])
@@ -328,6 +332,9 @@ def test_a_table_of_another_grid_is_told_by_which_side_is_longer() -> None:
         (("1", "2", "3"), [0.0, 2.0], [0.9, 0.4]),  # the whole numbers, of which one is above 1
         (("1", "3", "2"), [0.0, 2.0], [1.0, 0.0]),
         (("1", "2", "3"), [0.0, 7.0], [1.0, 1.0]),
+        # either may be of whole numbers up to 1
+        (("boxes", "labels", "3"), [0.0, 1.0], [1.0, 1.0]),
+        (("boxes", "classes", "3"), [0.0, 1.0], [1.0, 1.0]),
     ],
 )
 @pytest.mark.parametrize("first", ["labels", "scores"])
@@ -344,7 +351,33 @@ def test_lists_are_known_by_their_names_or_their_numbers(
     assert found.suppressed
 
 
+@pytest.mark.parametrize(
+    "lists",
+    [
+        {"2": [0.0, 1.0], "3": [1.0, 1.0]},  # which are the labels?
+        {"class_scores": [0.3, 1.0], "areas": [5.2, 1.5]},
+    ],
+)
+def test_lists_that_may_be_either_are_of_no_layout(lists: dict[str, list[float]]) -> None:
+    boxes = np.array([CORNERS, (8.0, 45.0, 16.0, 55.0)])
+    with pytest.raises(ValueError, match="of no known layout"):
+        proposals({"boxes": boxes, **{name: np.array(own) for name, own in lists.items()}}, SIZE)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "logits"), [(0.0, 1.0, False), (-1e-3, 1.0, True), (0.0, 1.001, True)]
+)
+def test_scores_below_0_or_above_1_are_logits(low: float, high: float, logits: bool) -> None:
+    table = table_of(300, 84)
+    table[0, :2, 4] = low, high
+    expected = 1.0 / (1.0 + np.exp(-table[0, :, 4])) if logits else table[0, :, 4]
+    found = proposals({"out": table}, (320, 320))
+    np.testing.assert_allclose(found.scores, expected, rtol=1e-5)
+
+
 def test_only_the_first_pictures_rows_of_a_list_count() -> None:
+    alone = np.array([[*CORNERS, 0.8, 0.0]])  # one row, and no picture
+    np.testing.assert_allclose(proposals({"out": alone}, SIZE).scores, [0.8])
     table = yolo_7_end_to_end()
     table[1] = 1.0, *CORNERS, 0.0, 0.8
     np.testing.assert_allclose(proposals({"out": table}, SIZE).scores, [0.9])
@@ -408,6 +441,9 @@ def test_peaks_of_a_map_are_the_highest_of_nine_and_two_hundred_at_most() -> Non
         expected = 4.0 * np.concatenate([centre - half, centre + half])
         np.testing.assert_allclose(corners, expected, rtol=1e-3, atol=1e-3)
     assert found.suppressed
+    for name in ("off", "reg"):
+        same = proposals({"hm": heat, name: offset, "wh": extent}, (320, 240), 1)
+        np.testing.assert_array_equal(same.corners, found.corners)
     with pytest.raises(ValueError, match="of no known layout"):
         proposals({"hm": heat[..., 1:], "wh": extent, "off": offset}, (320, 240))
 
@@ -623,6 +659,14 @@ def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:
     ports = ports_of(path.read_bytes())
     assert [(p.name, p.shape) for p in ports.inputs] == [("images", (1, 3, 0, 0))]
     assert [(p.name, p.shape) for p in ports.outputs] == [("a", (1, 6, 84))]
+    # a size of -1, of ten bytes, is as open as one with a name
+    port = helper.make_tensor_value_info("b", TensorProto.FLOAT, [-1, 84])
+    model = helper.make_model(helper.make_graph([], "open", [port], [port]))
+    assert ports_of(model.SerializeToString()).outputs[0].shape == (0, 84)
+    for inputs, outputs in (([port], []), ([], [port])):
+        model = helper.make_model(helper.make_graph([], "half", inputs, outputs))
+        with pytest.raises(ValueError, match="without inputs or outputs"):
+            ports_of(model.SerializeToString())
 
 
 # ── as a method ──────────────────────────────────────────────────────────────

@@ -145,6 +145,11 @@ def test_the_best_of_windows_that_overlap_takes_the_others() -> None:
     owners, best = strongest(edges, np.array([1.0, 3.0, 2.0, 0.5]), 0.3)
     assert best.tolist() == [1, 2]
     assert owners.tolist() == [1, 1, 2, 1]
+    # what the first has taken the next does not get
+    row = np.array([[0, 0, 10, 10], [4, 0, 14, 10], [8, 0, 18, 10]], float)
+    owners, best = strongest(row, np.array([3.0, 1.0, 2.0]), 0.3)
+    assert best.tolist() == [0, 2]
+    assert owners.tolist() == [0, 0, 2]
     nobody = strongest(np.zeros((0, 4)), np.zeros(0), 0.3)
     assert [len(one) for one in nobody] == [0, 0]
 

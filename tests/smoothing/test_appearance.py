@@ -246,9 +246,14 @@ def test_tracklets_that_look_alike_are_likelier_of_one_person() -> None:
     assert_allclose(model.log_ratio(ODD, EVEN)[0], [alike, different])
 
 
-@pytest.mark.parametrize(("people", "known"), [(4, False), (5, True)])
-def test_of_few_tracklets_nothing_is_said(people: int, known: bool) -> None:
+@pytest.mark.parametrize(
+    ("people", "away", "known"),
+    [(4, (), False), (5, (), True), (5, range(32, 36), False), (5, range(36, 40), False)],
+)
+def test_of_few_tracklets_nothing_is_said(people: int, away: range, known: bool) -> None:
+    """Nor of few that have boxes in both halves: the last lacks its first or its last four."""
     paths, links, camera, embeddings = recording(noisy(people))
+    links = links.take(~np.isin(links.rows, away))
     model = AppearanceModel(paths, links, [camera], [embeddings], STEP)
     ratio, seen = model.log_ratio(EVEN, ODD)
     assert seen.tolist() == [known] * 2
@@ -363,7 +368,12 @@ PEOPLE_STEP = 0.2
 FIRST, SECOND = [0.9, 0.1], [0.1, 0.9]
 
 
-def told(likenesses: list[list[float]], places: list[list[float]], weight: float = 1.0) -> ndarray:
+def told(
+    likenesses: list[list[float]],
+    places: list[list[float]],
+    weight: float = 1.0,
+    share: float = 1.0,
+) -> ndarray:
     """Of one piece whose boxes a camera shows, the first of the boxes of each step."""
     steps = len(likenesses)
     boxes = np.array([[x, 50.0, 5.0, 10.0] for own in places for x in own])
@@ -382,7 +392,7 @@ def told(likenesses: list[list[float]], places: list[list[float]], weight: float
     every[starts[:-1]] = likenesses
     piece = Paths.of([1], [0], [np.zeros((steps, 6))], [np.zeros((steps, 6, 6))], 6)
     rows = np.arange(steps)
-    links = Links(np.zeros(steps, dtype=np.int64), rows, starts[:-1].copy(), np.ones(steps))
+    links = Links(np.zeros(steps, dtype=np.int64), rows, starts[:-1].copy(), np.full(steps, share))
     return template_log_odds(piece, links, smoother, Appearances(None, [every]), weight)[0]
 
 
@@ -391,6 +401,9 @@ def test_boxes_of_ones_colours_count_by_the_time_that_they_last() -> None:
     own, other = (10 * PEOPLE_STEP * np.log(0.1 + 0.9 * 2.0 * p) for p in (0.9, 0.1))
     assert found == pytest.approx([0.0, other - own])
     assert told([FIRST] * 10, [[50.0]] * 10, 0.5) == pytest.approx(found / 2.0)
+    # and by how surely they are the own
+    assert told([FIRST] * 10, [[50.0]] * 10, share=0.8) == pytest.approx(0.8 * found)
+    assert not told([FIRST] * 10, [[50.0]] * 10, share=0.7).any()
 
 
 def test_boxes_that_look_now_like_one_and_now_like_the_other_tell_less_but_no_stranger() -> None:

@@ -24,7 +24,7 @@ from tracker.smoothing.bodies import (
     standing_heights,
 )
 from tracker.smoothing.calibration import upright
-from tracker.smoothing.noise import NoiseModel
+from tracker.smoothing.noise import LEAST_ROWS, NoiseModel
 from tracker.smoothing.paths import Paths
 
 HALF = float(world.PERSON[2])
@@ -177,6 +177,24 @@ def test_the_radius_of_walkers_is_found_and_positions_gain_by_it(radius: float) 
     ]
     stated, held = ((own < chi2.ppf(0.95, 2)).mean() for own in squares)
     assert stated < 0.9 < held
+
+
+@pytest.mark.parametrize(
+    ("steps", "share", "bodies", "noise"),
+    [
+        (LEAST_ROWS, 1.0, True, True), (LEAST_ROWS - 1, 1.0, False, False),
+        (LEAST_ROWS, 0.9, False, True), (LEAST_ROWS, 0.5, False, False),
+    ],
+)  # fmt: skip
+def test_bodies_and_noise_are_estimated_from_rows_that_two_cameras_surely_see(
+    steps: int, share: float, bodies: bool, noise: bool
+) -> None:
+    scene = known(world.stand((0.3, 0.2), steps)[:, None], cameras=world.ring(2))
+    smoother, (paths, links) = scene.smoother(), scene.paths(sigma=0.1)
+    fitted, learnt = smoother.fit(paths, links, 2), smoother.uncalibrated(paths)
+    less = replace(links, shares=np.full(len(links.shares), share))
+    assert (smoother.with_bodies(fitted.paths, less, learnt) is not learnt) == bodies
+    assert (smoother.reported(fitted, less, learnt) is not None) == noise
 
 
 def test_radius_and_level_are_those_of_one_least_squares_fit_of_everything() -> None:

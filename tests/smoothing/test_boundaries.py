@@ -100,6 +100,9 @@ def test_who_is_not_somebody_else_ends_before_that_one_begins() -> None:
     assert existence_spans(apart, [[0], [1], [2]], cut) == {
         0: (0, 7), 1: (5, int(np.iinfo(np.int64).max))
     }  # fmt: skip
+    # two who are both there at a step limit nothing
+    shared = standing((1, 0, 4, 0.0), (2, 4, 9, 0.0))
+    assert existence_spans(Constraints(cannot_link=((0, 1),)), [[0], [1]], shared) == {}
     own = Constraints(firsts=frozenset({1}), lasts=frozenset({0}))
     assert existence_spans(own, [[0], [1]], cut)[0] == (0, 4)
     assert existence_spans(own, [[0], [1]], cut)[1][0] == 8

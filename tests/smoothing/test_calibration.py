@@ -113,6 +113,17 @@ def test_offsets_and_sizes_are_means_drawn_to_nothing_by_their_priors() -> None:
     assert_allclose(smoother.learn(paths, links, known_sizes).offsets, found.offsets, atol=1e-9)
 
 
+def test_a_box_that_the_picture_cuts_is_no_witness() -> None:
+    """The second stands close below the first camera, which sees a part of the box."""
+    scene = known(np.tile([[0.3, 0.2, 0.85], [3.0, 0.4, 0.85]], (12, 1, 1)))
+    offset = np.array([0.0, 0.02, 0.03])
+    smoother = planted(scene, [offset, offset])
+    paths, links = scene.paths(sigma=0.01)
+    assert np.count_nonzero(links.cameras == 0) == 24
+    found = smoother.learn(paths, links, smoother.uncalibrated(paths))
+    assert_allclose(found.offsets[0], offset * 12.0 / (12.0 + OFFSET_RIDGE), atol=1e-9)
+
+
 @pytest.mark.parametrize(("off", "tells"), [(0.39, True), (0.41, False)])
 def test_a_box_of_another_posture_is_no_witness(off: float, tells: bool) -> None:
     scene = standing(3)

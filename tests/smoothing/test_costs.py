@@ -130,18 +130,17 @@ def test_the_longest_gap_is_two_seconds_and_the_fastest_goes_three_metres_in_one
 
 def test_who_comes_back_is_one_of_those_who_left() -> None:
     """By the label of the filter alone; by looks as likely as one of all who were gone."""
-    paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0))
-    chains = [[0], [1], [2], [3]]
+    paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0), (8, 5, 8, 0.0))
+    chains = [[0], [1], [2], [3], [4]]
     found = costs.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2)]
     assert found.gains == pytest.approx([newcomer + costs.KEEPING])
     assert found.gaps.tolist() == [6]
-    # of one chain already, or overlapping, nothing is said
-    assert (
-        len(costs.long_gap_odds(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None, RATES).gains)
-        == 0
-    )
+    # of one chain already, or of two that are both there at a step, nothing is said
+    for chains in ([[0, 2], [1]], [[0, 4], [2]]):
+        found = costs.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
+        assert len(found.gains) == 0
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.5])
@@ -192,8 +191,8 @@ def test_a_cut_is_told_where_a_track_does_not_go_on_as_the_filter_had_it() -> No
 
 
 def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
-    cut = standing((4, 0, 5, 0.0), (7, 6, 9, 0.0), (8, 0, 4, 1.0), (9, 12, 14, 0.0), (9, 16, 19, 0))
-    pairs = Pairs(np.array([0, 2, 1]), np.array([1, 1, 3]), np.array([1, 2, 3]),
+    cut = standing((4, 0, 5, 0.0), (7, 6, 9, 0.0), (8, 0, 4, 1.0), (9, 11, 14, 0.0), (9, 16, 19, 0))
+    pairs = Pairs(np.array([0, 2, 1]), np.array([1, 1, 3]), np.array([1, 2, 2]),
                   np.array([2.0, 1.0, -1.0]))  # fmt: skip
     found = linking.join_decisions(cut, pairs, [[0, 1, 3, 4], [2]], [4, 8], -3.0, set())
     weights = np.exp([2.0, 1.0, -3.0])
@@ -201,7 +200,7 @@ def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
     assert (first.step, first.label, first.other) == (6, 4, 7)
     assert (first.probability, first.against) == pytest.approx(tuple(weights[:2] / weights.sum()))
     assert first.reason == "one person goes on"
-    assert (second.step, second.other, second.reason) == (12, 9, "one person")
+    assert (second.step, second.other, second.reason) == (11, 9, "one person")
     assert second.probability == pytest.approx(1.0 / (1.0 + np.exp(-2.0)))
     told = linking.join_decisions(cut, pairs, [[0, 1], [2]], [7, 8], -3.0, {(0, 1)})[0]
     assert (told.other, told.probability, told.reason) == (4, 1.0, "a person said so")

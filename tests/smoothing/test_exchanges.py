@@ -9,7 +9,12 @@ from scipy.stats import multivariate_normal
 
 from tests.smoothing.known import STEP, fitted_to, measured
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.motion import exchange_breaks, exchange_log_odds, find_exchange
+from tracker.smoothing.tracklets.motion import (
+    _best_of_encounters,
+    exchange_breaks,
+    exchange_log_odds,
+    find_exchange,
+)
 
 SIGMA = 0.05
 
@@ -110,3 +115,15 @@ def test_both_are_cut_from_the_least_odds_on(least: float, cut: bool) -> None:
     most = exchange_log_odds(paths, np.array([10]), np.array([30]))[0]
     found = exchange_breaks(paths, reach=2.5, least=most + least, apart=40)
     assert found.any() == cut
+
+
+@pytest.mark.parametrize(("last", "rows"), [(7, [1]), (8, [1, 2])])
+def test_two_who_are_apart_for_longer_meet_anew(last: int, rows: list[int]) -> None:
+    one, other = np.array([0, 1, 0]), np.array([1, 0, 1])
+    gains = np.array([1.0, 5.0, 4.0])
+    assert _best_of_encounters(one, other, np.array([2, 3, last]), gains, 4) == rows
+
+
+def test_encounters_are_of_the_same_two() -> None:
+    one, other = np.array([0, 0, 1]), np.array([1, 2, 2])
+    assert _best_of_encounters(one, other, np.array([2, 3, 4]), np.ones(3), 4) == [0, 1, 2]

@@ -189,9 +189,9 @@ def test_who_came_from_elsewhere_is_shown_apart_wherever_the_boxes_are() -> None
     assert not apart[late].all(), "one camera sees them one behind the other"
 
 
-def test_who_is_gone_takes_nothing_from_who_stands_there_now() -> None:
+def test_who_is_as_likely_gone_takes_nothing_from_who_stands_there_now() -> None:
     smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
-    there = np.where(paths.steps < (BEGIN + END) // 2, 1.0, 0.0)
+    there = np.where(paths.steps < (BEGIN + END) // 2, 1.0, 0.5)
     there[paths.owners == 1] = 1.0
     apart = select_separate_links(smoother, paths, shared, there, np.array([9.0, 4.0]))
     late = paths.steps[shared.links.rows] >= (BEGIN + END) // 2

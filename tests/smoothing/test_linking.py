@@ -109,7 +109,7 @@ def test_the_best_of_all_ways_to_join_a_few_pieces(seed: int) -> None:
 def test_the_best_of_all_ways_whose_chains_are_one_person_each(seed: int) -> None:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(2, 5))
-    people = rng.normal(0.0, 4.0, (count, 3))
+    people = rng.normal(0.0, 4.0, (count, 2 + seed % 2))
     numbers = {
         "worths": rng.normal(2.0, 6.0, count),
         "births": rng.normal(-4.0, 1.0, count),
@@ -342,6 +342,10 @@ def test_what_lies_between_two_who_are_one_leads_from_the_one_to_the_other() -> 
     assert link_tracklets(plain) == [[0, 1], [2, 3]]
     assert link_tracklets(plain, Constraints(must_link=((0, 3),))) == [[0, 1, 3], [2]]
     assert link_tracklets(plain, Constraints(cannot_link=((0, 1),))) == [[0], [1], [2, 3]]
+    # the last first: nothing depends on how they are numbered
+    turned = replace(plain, earlier=3 - earlier, later=3 - later)
+    assert link_tracklets(turned, Constraints(must_link=((1, 0),))) == [[1, 0], [3, 2]]
+    assert link_tracklets(turned, Constraints(must_link=((3, 0),))) == [[1], [3, 2, 0]]
 
 
 def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:
@@ -455,6 +459,9 @@ def pieces() -> tuple[Paths, ndarray]:
         (said("same", at(2), at(5)), []),  # one path is one person's already
         (said("same", at(9), at(14)), []),  # the one is gone when the other comes
         (said("different", at(2), at(5, 5.0)), []),
+        (said("different", at(2), at(5, 3.0)), []),
+        (said("same", at(2), at(5, 3.0)), []),
+        (said("different", at(12), at(13)), []),  # both nearest to one row
         (said("name", at(4), name="Anna"), []),
         (said("here", at(4)), []),
     ],

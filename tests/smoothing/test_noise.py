@@ -235,11 +235,27 @@ def test_a_path_of_a_single_row_tells_nothing_of_the_noise() -> None:
     rows = choose_rows(standing(*spans), np.full(63, 2))
     assert rows is not None
     assert rows.tolist() == [*range(60), 61, 62]
-    # nor where no window is seen by two cameras in half of its rows
-    seen = np.where(np.arange(181) % WINDOW < 25, 2, 1)
-    rows = choose_rows(standing((1, 0, 179, 0.0), (2, 3, 3, 2.0)), seen)
+
+
+@pytest.mark.parametrize(
+    ("windows", "chosen"),
+    [
+        ([(60, 30), (60, 29)], [0]),
+        ([(LEAST_ROWS, LEAST_ROWS), (60, 29)], [0]),
+        # where too few rows are left, whatever two cameras see at all is used
+        ([(LEAST_ROWS - 1, LEAST_ROWS - 1), (60, 29)], [0, 1]),
+        ([(60, 25), (60, 25), (1, 1), (60, 0)], [0, 1]),
+    ],
+)
+def test_windows_of_which_two_cameras_see_half_are_chosen(
+    windows: list[tuple[int, int]], chosen: list[int]
+) -> None:
+    """Of each window: its rows, and of how many two cameras see the person."""
+    paths = paths_of(*[length for length, _ in windows])
+    counts = np.concatenate([np.where(np.arange(length) < seen, 2, 1) for length, seen in windows])
+    rows = choose_rows(paths, counts)
     assert rows is not None
-    assert rows.tolist() == [*range(180)]
+    assert np.unique(paths.owners_of(rows)).tolist() == chosen
 
 
 def test_what_does_not_average_is_considered() -> None:
@@ -496,16 +512,33 @@ def test_without_movement_no_delay_is_known() -> None:
     assert np.isnan(found.delay_sigmas).all()
 
 
-def test_of_two_cameras_none_is_out_of_line() -> None:
+@pytest.mark.parametrize(
+    ("cameras", "steps", "known"), [(2, 600, False), (3, 600, True), (3, 20, True), (3, 18, False)]
+)
+def test_of_two_cameras_or_in_few_steps_none_is_out_of_line(
+    cameras: int, steps: int, known: bool
+) -> None:
     paths, seen = noisier(0, 1, 5.0)
-    two = np.flatnonzero(seen.cameras < 2)
+    # two cameras see the person at a time; of few steps two are a block
+    own = np.flatnonzero((seen.cameras < cameras) & (seen.rows < steps))
+    if cameras > 2:
+        own = own[seen.cameras[own] != seen.rows[own] % cameras]
     few = SureBoxes(
-        seen.cameras[two], seen.rows[two], seen.residuals[two], seen.jacobians[two],
-        seen.half_heights[two],
+        seen.cameras[own], seen.rows[own], seen.residuals[own], seen.jacobians[own],
+        seen.half_heights[own],
     )  # fmt: skip
-    found = errors_of(paths, few, offsets=NO_OFFSETS[:2])
-    assert np.isnan(found.factors).all()
-    assert found.out_of_line is None
+    found = errors_of(paths, few, offsets=NO_OFFSETS[:cameras])
+    assert np.isfinite(found.factors).all() == known
+    assert known or found.out_of_line is None
+
+
+@pytest.mark.parametrize(("bound", "named"), [(FACTOR, None), (FACTOR + 1e-9, (1, "horizontal"))])
+def test_a_camera_is_out_of_line_from_its_lower_bound_on(
+    bound: float, named: tuple[int, str] | None
+) -> None:
+    least = np.ones((3, 4))
+    least[1, 0] = bound
+    assert CameraErrors(2.0 * least, least, *np.zeros((2, 3))).out_of_line == named
 
 
 @pytest.mark.parametrize(("cameras", "normal"), [(1, 2.5758), (4, 3.0233)])

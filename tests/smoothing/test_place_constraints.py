@@ -82,16 +82,16 @@ def test_who_is_somewhere_else_leaves_the_way_and_finds_back_as_fast_as_one_walk
 
 def test_the_way_to_a_place_ends_at_the_next_one() -> None:
     paths = standing((1, 0, 7, 0.0))
-    said = [make(kind="here", places=[[row, 0.0, 0.0, 0.85]]) for row in (3, 5)]
-    both = PlaceMeasurements.of(np.array([3, 5]), said)
-    asides = np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
-    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, asides).lead(
+    said = [make(kind="here", places=[[row, 0.0, 0.0, 0.85]]) for row in (1, 3, 5)]
+    every = PlaceMeasurements.of(np.array([1, 3, 5]), said)
+    asides = np.array([[0.0, 0.7, 0.0], [0.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    led = PlaceMeasurements(every.rows, every.points, every.sigmas, every.noises, asides).lead(
         paths, 0.4
     )
-    assert_allclose(led.states[:, 1], [0, 0, 0, 0, 1.4, 0, 1.4, 0.8], atol=1e-12)
+    assert_allclose(led.states[:, 1], [0.1, 0, 0.1, 0, 1.4, 0, 1.4, 0.8], atol=1e-12)
     # six steps of a third of the way: at exactly nothing left it ends
-    third = np.array([[0.0, 0.0, 0.0], [0.0, 0.6, 0.0]])
-    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, third).lead(
+    third = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.6, 0.0]])
+    led = PlaceMeasurements(every.rows, every.points, every.sigmas, every.noises, third).lead(
         paths, 0.4
     )
     assert not led.states[:, 1].any()

@@ -12,6 +12,8 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters.groups.smoothing import SmoothingParams
+from tracker.smoothing.tracklets import linking
+from tracker.smoothing.tracklets.appearance import Appearances
 from tracker.smoothing.tracklets.constraints import ConstraintResolver
 from tracker.smoothing.tracklets.costs import Rates
 from tracker.smoothing.tracklets.splitting import Splits, Tracked, find_splits, split_tracks
@@ -80,18 +82,29 @@ def test_a_piece_reaches_from_the_first_box_to_the_last() -> None:
     assert left_out(found) == [0, 1, 28, 29]
 
 
-def test_where_a_path_goes_on_under_another_name_it_is_cut() -> None:
-    names = np.full(STEPS, 7)
-    names[10:13], names[13:20], names[20:] = -1, 9, 7
+@pytest.mark.parametrize(("begin", "own", "other"), [(10, 7, 9), (1, 0, 9), (10, 9, 0)])
+def test_where_a_path_goes_on_under_another_name_it_is_cut(
+    begin: int, own: int, other: int
+) -> None:
+    names = np.full(STEPS, own)
+    names[begin:13], names[13:20] = -1, other
     found = find_splits(tracked(standing(), names=names), P)
-    assert left_out(found) == [10, 11, 12]
+    assert left_out(found) == list(range(begin, 13))
     assert np.flatnonzero(found.breaks).tolist() == [13, 20]
     # a gap after which it has the same name is none, nor is one at either end
-    names = np.full(STEPS, 7)
+    names = np.full(STEPS, own)
     names[:2], names[10:13], names[27:] = -1, -1, -1
     found = find_splits(tracked(standing(), names=names), P)
     assert found.clear.all()
     assert not found.breaks.any()
+
+
+def test_a_gap_that_is_linked_over_is_filled_and_has_no_name() -> None:
+    gap = range(12, 18)
+    found = linking.link_tracks(tracked(standing(*gap)), P, Appearances())
+    assert len(found.paths.labels) == 1
+    assert np.flatnonzero(~found.had).tolist() == [*gap]
+    assert np.flatnonzero(found.names < 0).tolist() == [*gap]
 
 
 @pytest.mark.parametrize(("length", "seen", "cut_out"), [(6, False, True), (6, True, False)])
@@ -128,7 +141,7 @@ def replace_p(**changes: float) -> SmoothingParams:
 
 def test_short_pieces_beside_longer_ones_are_left_out_and_names_are_the_filters() -> None:
     """Four steps of 0.1 s stand for themselves, three do not."""
-    one = tracked(standing(), names=np.repeat([7, 9, -1], 10))
+    one = tracked(standing(), names=np.repeat([0, 9, -1], 10))
     clear = np.ones(STEPS, dtype=bool)
     clear[[10, 14, 18, 29]] = False
     plain = Splits(
@@ -147,11 +160,15 @@ def test_short_pieces_beside_longer_ones_are_left_out_and_names_are_the_filters(
     some[18] = True
     pieces, _ = split_tracks(one, replace(plain, clear=some), nobody)
     assert pieces.firsts.tolist() == [0, 15]
-    assert pieces.labels.tolist() == [7, 9]
+    assert pieces.labels.tolist() == [0, 9]
     four = clear.copy()
     four[10] = True
     four[9] = False
     pieces, _ = split_tracks(one, replace(plain, clear=four), nobody)
     assert pieces.firsts.tolist() == [0, 10, 19]
     assert pieces.lasts.tolist() == [8, 13, 28]
-    assert pieces.labels.tolist() == [7, 9, 9]
+    assert pieces.labels.tolist() == [0, 9, 9]
+    # four in a row are long enough to leave out a shorter one
+    three = np.zeros(STEPS, dtype=bool)
+    three[1:5] = three[6:9] = True
+    assert split_tracks(one, replace(plain, clear=three), nobody)[0].lasts.tolist() == [4]

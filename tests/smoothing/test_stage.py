@@ -378,7 +378,11 @@ def test_a_path_reaches_from_the_first_box_to_the_last_report_and_through_gaps()
     sources = fused[2].sources.copy()
     sources[:, 0] = -1
     nobody = replace(fused[2], sources=sources)  # no box fed the first there
-    for results, first in ((fused, 2), ([*fused[:2], nobody, *fused[3:]], 3)):
+    one = sources.copy()
+    one[0, 0] = 0
+    single = replace(fused[2], sources=one)  # the first box of one camera did
+    for at_second, first in ((fused[2], 2), (nobody, 3), (single, 2)):
+        results = [*fused[:2], at_second, *fused[3:]]
         tracks = trajectories.extract(results, cameras=3, extraction_threshold=0.5)
         paths, had = read_paths(stored(results), tracks, 6)
         assert paths.labels.tolist() == [0, 8]

@@ -118,15 +118,14 @@ class CameraUpdate(NamedTuple):
 def _part(expected: Expected, count: int, last: int) -> Expected:
     """Select the predictions of the ``count`` components before the component ``last``."""
     first = last - count
-    spreads, others = expected.spreads, len(expected.posture_values) > 0
-    begin, end = (first, last) if others else (0, 0)
+    # spreads and postures may be none: of nothing any part is nothing
     return Expected(
         expected.values[first:last],
         expected.jacobians[first:last],
-        spreads[first:last] if len(spreads) > 0 else spreads,
-        expected.posture_values[begin:end],
-        expected.posture_jacobians[begin:end],
-        expected.posture_spreads[begin:end],
+        expected.spreads[first:last],
+        expected.posture_values[first:last],
+        expected.posture_jacobians[first:last],
+        expected.posture_spreads[first:last],
         expected.posture_drift,
         expected.posture_share,
     )

@@ -229,7 +229,7 @@ def _delays(
     free = np.eye(cameras) - 1.0 / cameras
     inverse = np.linalg.pinv(free @ curvature @ free, rcond=1e-6, hermitian=True)
     variances = np.diagonal(inverse)
-    if (variances <= 0.0).any() and cameras > 1:
+    if (variances <= 0.0).any():
         return unknown, unknown  # where people stand still, nothing shows a delay
     sigmas = step_time * np.sqrt(np.maximum(variances, 0.0))
     return np.asarray(step_time * inverse @ free @ slope), np.asarray(sigmas)

@@ -139,9 +139,9 @@ def _detection_odds(
         shown: Expected number of cameras with a detection at each of N rows.
         appearance: Sum of the log likelihood ratios of these boxes' appearance.
     """
-    outweighed = np.minimum(appearance + hit * np.maximum(shown - _MEETING_BY_CHANCE, 0.0), 0.0)
+    offset = hit * np.maximum(shown - _MEETING_BY_CHANCE, 0.0)
     meeting = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
-    return np.asarray(meeting + np.where(appearance < 0.0, outweighed, appearance))
+    return np.asarray(meeting + np.minimum(appearance + offset, np.maximum(appearance, 0.0)))
 
 
 def extend_paths(

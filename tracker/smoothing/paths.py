@@ -154,7 +154,7 @@ def contested_shares(paths: Paths, links: Links) -> Float[ndarray, " N"]:
     follows[leader[second]] = share[second]
     rival = np.where(first, follows[leader], share[leader])
     lost = np.bincount(links.rows[order], np.minimum(share, rival), rows)
-    return np.asarray(np.where(own > 0.0, lost / np.maximum(own, 1e-12), 0.0))
+    return np.asarray(lost / np.maximum(own, 1e-12))
 
 
 def split_paths(

@@ -347,7 +347,7 @@ class PeakFinder:
         """Whether each peak is of another person than the one nearest in colours to the shape:
         two people in front of each other have one shape in the image."""
         behind = np.zeros(len(peaks), dtype=bool)
-        for k in np.flatnonzero(supported.sum(axis=1) > 1):
+        for k in np.flatnonzero(supported.any(axis=1)):
             own = np.flatnonzero(supported[k])
             apart = np.abs(peaks[own, :2] - found.boxes[k, :2]) / found.sizes[k]
             nearest = own[(apart**2).sum(axis=1).argmin()]

@@ -72,8 +72,7 @@ def determine_cases(
     new = np.asarray(~positive.any(axis=0))
     own = np.where(missed, -1, own)
     if not targets or not count:
-        none = np.full(targets, -1)
-        return Cases(own, none, none >= 0, missed, new)
+        return Cases(own, np.full(targets, -1), np.zeros(targets, dtype=bool), missed, new)
     wanted = np.where(own >= 0, own, matrix.argmax(axis=1))
     wanted[missed] = -1
     if every_shared_row:
@@ -370,7 +369,7 @@ def _left_over(
     after = (piece[:2] + piece[2:]) - (shown[:, :2] + shown[:, 2:]).max(axis=0)
     wider, narrower = np.maximum(before, after), np.minimum(before, after)
     clear = (wider > one_side * np.maximum(narrower, 0.0)) & (wider <= 2.0 * half_sizes)
-    return np.where(clear & (wider > 0.0), np.where(before > after, -1, 1), 0)
+    return np.where(clear, np.where(before > after, -1, 1), 0)
 
 
 def _put(targets: Targets, t: int, one: Targets) -> Targets:

@@ -229,8 +229,8 @@ class Jpda:
         p = self._parameters
         if not p.five_cases:
             cases = determine_cases(matrix, own, 0.0, every_shared_row=False)
-            none = np.full(expected.size, -1)
-            return replace(cases, shared=none, split=none >= 0), matrix
+            none = np.zeros(expected.size, dtype=bool)
+            return replace(cases, shared=np.full(expected.size, -1), split=none), matrix
         inside = p.occlusion == "inside"
         cases = determine_cases(matrix, own, p.least_probability, every_shared_row=not inside)
         if inside:
@@ -289,8 +289,8 @@ class Jpda:
         matrix = np.zeros((after, len(seen.boxes)))
         matrix[: len(managed.stayed)] = updated.matrix[managed.stayed]
         matrix[np.arange(len(managed.stayed), after), managed.sources] = 1.0
-        matrix = matrix[managed.targets.labels > 0]
-        labels = managed.targets.labels[managed.targets.labels > 0]
+        counting = managed.targets.labels > 0
+        matrix, labels = matrix[counting], managed.targets.labels[counting]
         explained = matrix.sum(axis=0)
         believed = np.flatnonzero(explained > BELIEVED)
         if not len(believed):

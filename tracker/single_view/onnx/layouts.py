@@ -200,8 +200,8 @@ def _named(arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int) ->
         next((n for n in whole if rest[n].max() > 1 or len(whole) == 1), None),
     )
     scores = next((n for n in rest if "score" in n or "conf" in n), None)
-    scores = scores or next((n for n in rest if n != labels), None)
-    if labels is None or scores is None or labels == scores:
+    scores = scores or next(n for n in rest if n != labels)
+    if labels is None or labels == scores:
         return None
     # the object detection API of TensorFlow: top, left, bottom, right, and classes from 1
     swapped = "detection_boxes" in boxes

@@ -297,7 +297,7 @@ def combine_constraints(
         found = dict(groups)
         for i, j in pairs:
             one, other = found.get(i, [i]), found.get(j, [j])
-            if one is other or i == j:
+            if one is other:
                 continue
             both = sorted({*one, *other}, key=lambda tracklet: int(firsts[tracklet]))
             if any(lasts[a] >= firsts[b] for a, b in itertools.pairwise(both)):

@@ -343,7 +343,7 @@ def _pairs(fitted: Fitted, reach: float) -> tuple[Int[ndarray, " P"], Int[ndarra
     """The pairs of rows of two paths at one step that are near each other, without first rows."""
     paths = fitted.paths
     inner = np.ones(len(paths.states), dtype=bool)
-    inner[paths.starts[:-1][np.diff(paths.starts) > 0]] = False
+    inner[paths.starts[:-1]] = False
     rows = np.flatnonzero(inner)
     rows = rows[np.argsort(paths.steps[rows], kind="stable")]
     steps = paths.steps[rows]
