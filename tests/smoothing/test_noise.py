@@ -548,7 +548,7 @@ def test_notes_name_a_late_camera_and_one_that_is_out_of_line() -> None:
     assert [remedy.camera for one in check(late) for remedy in one.remedies] == [name]
     assert run.smoothed is not None
     assert run.smoothed.cameras is not None
-    assert run.smoothed.cameras.delays[2] == pytest.approx(0.19, rel=0.3)
+    assert run.smoothed.cameras.delays[2] == pytest.approx(0.19, rel=0.4)
     factors = np.ones((4, 4))
     factors[1, 3] = 2.6
     odd = replace(run.smoothed.cameras, factors=factors, least=0.9 * factors)
