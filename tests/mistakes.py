@@ -34,6 +34,11 @@ def camera_to_world(sequence: Sequence) -> Sequence:
     return _with_cameras(sequence, lambda c: _posed(c, c.rotation.T, c.centre))
 
 
+def transposed(sequence: Sequence) -> Sequence:
+    """R transposed, t as it is: points in rows."""
+    return _with_cameras(sequence, lambda c: _posed(c, c.rotation.T, c.translation))
+
+
 def opengl(sequence: Sequence) -> Sequence:
     """Camera axes with y up and z back."""
     return _with_cameras(sequence, lambda c: _posed(c, FLIP @ c.rotation, FLIP @ c.translation))

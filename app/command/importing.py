@@ -178,9 +178,10 @@ def _checks(sequence: Any) -> list[Any]:
 
 def _print_checks(sequence: Any, checks: Sequence[Any], *, as_json: bool = False) -> int:
     """Every check in a row, or as JSON; status 1 where one of them warns."""
+    from tracker.io.importing.remedies import unsaid
     from tracker.sequences.finding import warning
 
-    checks = [*checks, *(warning("opening", words) for words in sequence.warnings)]
+    checks = [*checks, *(warning("opening", own) for own in unsaid(sequence.warnings, checks))]
     if as_json:
         facts = [(one, {k: float(v) for k, v in one.numbers.items()}) for one in checks]
         print_json(

@@ -133,6 +133,14 @@ def test_a_run_without_tracks_names_gate_and_value(
     assert re.search(words, told), told
 
 
+def test_a_method_that_holds_its_boxes_back_is_named_and_not_the_room(tmp_path: Path) -> None:
+    told = why_no_tracks(
+        run_of(film(tmp_path, stays=False), single_view="jpda", jpda__confirmation_steps=STEPS + 1)
+    )
+    assert told is not None
+    assert "0 passed on to the fusion: jpda itself holds them back" in told
+
+
 def test_where_candidates_pass_no_gate_is_named(tmp_path: Path) -> None:
     assert decisive_gate(run_of(film(tmp_path, stays=False))) is None
 

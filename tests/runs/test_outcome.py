@@ -17,7 +17,10 @@ from tracker.runs.outcome import StageCounts, _losing_stage, why_no_tracks
 from tracker.runs.run import Run
 from tracker.sequences.reader import read_sequence
 
-ALL = StageCounts(frames=100, found=1000, passed=20, together=5, begun=3, surest=0.4, tracks=0)
+ALL = StageCounts(
+    frames=100, found=1000, outside=500, passed=20, together=60, pairs=60, begun=3, surest=0.4,
+    tracks=0,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -26,13 +29,17 @@ ALL = StageCounts(frames=100, found=1000, passed=20, together=5, begun=3, surest
         ({"frames": 0}, 2, "not one of the frames of boxes could be read"),
         ({"found": 0}, 2, "lower what a box must have to count"),
         ({"passed": 19}, 2, "nearly none can stand in [room]"),
+        ({"passed": 19, "outside": 499}, 2, "colour_phd itself holds them back"),
+        ({"found": 20, "passed": 22}, 2, "20 boxes found, 22 passed on to the fusion"),
+        ({"pairs": 59, "begun": 0}, 2, "0 tracks begun: these are too few boxes to tell why"),
+        ({"pairs": 59}, 2, "3 tracks begun: these are too few boxes to tell why"),
         ({"together": 0}, 2, "a track begins where boxes of two cameras meet"),
         (
             {"together": 0, "begun": 0},
             1,
-            "20 of them passed on to the fusion, 0 tracks begun: the ",
+            "20 passed on to the fusion, 0 tracks begun: the ",
         ),
-        ({"together": 0}, 1, "20 of them passed on to the fusion, 3 tracks begun, the surest"),
+        ({"together": 0}, 1, "20 passed on to the fusion, 3 tracks begun, the surest"),
         ({"begun": 0}, 2, "boxes of different cameras meet nowhere"),
         ({}, 2, "3 tracks begun, the surest with existence 0.40, below the extraction"),
     ],

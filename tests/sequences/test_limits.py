@@ -204,7 +204,7 @@ def test_a_projection_may_lie_so_far_away_and_no_further() -> None:
 
 def test_a_camera_is_warned_of_where_nothing_of_the_room_is_in_sight() -> None:
     def warned(low: list[float], high: list[float]) -> bool:
-        return bool(list(check_view_of_room(camera(), Room(np.array(low), np.array(high)))))
+        return bool(list(check_view_of_room([camera()], Room(np.array(low), np.array(high)))))
 
     # it stands at z = -4, looks along z and sees a fifth of the depth to either side
     assert not warned([-1.0, -1.0, 0.0], [1.0, 1.0, 2.0])

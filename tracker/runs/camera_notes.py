@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracker.io.checks.synchronisation import LEAST_STEPS, common_offset
 from tracker.io.checks.timing import uneven_clocks
 from tracker.runs.run import Run
 from tracker.smoothing.camera_errors import CameraErrors, Quantity, significant_deviations
@@ -22,8 +23,9 @@ _ERRING: dict[Quantity, str] = {
 def camera_notes(run: Run) -> list[str]:
     """Describe which camera's boxes err more than those of the others, and which cameras are late.
 
-    A delay is named where it is significant, and somebody who walks moves by more in this time than
-    the boxes of a camera are off. A camera that lost frames is named in the check's words.
+    A delay is named where it is significant, as long as the check reports it, and somebody who
+    walks moves by more in this time than the boxes of a camera are off. A camera that lost frames
+    is named in the check's words.
     """
     smoothed = run.smoothed
     if smoothed is None or smoothed.cameras is None or smoothed.noise is None:
@@ -59,11 +61,17 @@ def out_of_line_notes(run: Run) -> list[str]:
 
 
 def _delays(errors: CameraErrors, names: list[str], least: float, fps: float) -> list[str]:
-    """Describe the delays of more than ``least`` seconds that are significant."""
+    """Describe the delays of more than ``least`` seconds that are significant.
+
+    As in the check, they are relative to the clock that most cameras share, and those of fewer than
+    :data:`~tracker.io.checks.synchronisation.LEAST_STEPS` are none: a step shows the frame that is
+    nearest in time.
+    """
+    steps = errors.delays * fps - common_offset(errors.delays * fps)
     bound = np.maximum(least, significant_deviations(len(names)) * errors.delay_sigmas)
+    late = (np.abs(errors.delays) > bound) & (np.abs(steps) >= LEAST_STEPS)
     return [
-        f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s '
-        f"({abs(errors.delays[camera]) * fps:.1f} steps) "
-        + ("late" if errors.delays[camera] > 0.0 else "early")
-        for camera in np.flatnonzero(np.abs(errors.delays) > bound).tolist()
+        f'camera "{names[camera]}" is {abs(steps[camera]) / fps:.2f} s '
+        f"({abs(steps[camera]):.1f} steps) {'late' if steps[camera] > 0.0 else 'early'}"
+        for camera in np.flatnonzero(late).tolist()
     ]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.runs.run import Run
-from tracker.single_view.protocol import CANDIDATES, DROPPED, SHAKE, TRUST, UNCERTAINTY
+from tracker.single_view.protocol import CANDIDATES, DROPPED, OUTSIDE, SHAKE, TRUST, UNCERTAINTY
 
 _HALF = 0.5
 """Trust in the foreground below which people are not detected by it; uncertainty of the
@@ -30,12 +30,12 @@ _SLIDERS = {
     ("jpda", "foreground"): "lower jpda.least_inside",
     ("jpda", "surroundings"): "raise jpda.most_above or jpda.most_beside",
     ("jpda", "another's shoulders"): "lower jpda.shoulder_across",
-    ("jpda", "a place outside the room"): "raise detection_boxes.room_tolerance",
+    ("jpda", OUTSIDE): "raise detection_boxes.room_tolerance",
     ("association_matrix", "foreground"): "lower association_matrix.least_inside",
     ("association_matrix", "outline"): "lower association_matrix.acceptance",
-    ("onnx_detector", "a place outside the room"): "raise detection_boxes.room_tolerance",
-    ("detection_phd", "a place outside the room"): "raise detection_boxes.room_tolerance",
-    ("none", "a place outside the room"): "raise detection_boxes.room_tolerance",
+    ("onnx_detector", OUTSIDE): "raise detection_boxes.room_tolerance",
+    ("detection_phd", OUTSIDE): "raise detection_boxes.room_tolerance",
+    ("none", OUTSIDE): "raise detection_boxes.room_tolerance",
 }
 """What lets more candidates through, by method and gate; at other gates it is no single value."""
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.runs.gates import decisive_gate
+from tracker.geometry.consistency.suggestion import LEAST_POSSIBLE
+from tracker.runs.gates import count_gates, decisive_gate
 from tracker.runs.run import Run
+from tracker.single_view.protocol import OUTSIDE
 
 _NEARLY_NONE = 0.02
-"""Share of the boxes passed on to the fusion below which their size and place are named as the
-reason. An estimate: it chooses between two sentences, and no result depends on it."""
+"""Share of the boxes passed on to the fusion below which the others are named as the reason. An
+estimate: it chooses between two sentences, and no result depends on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +25,16 @@ class StageCounts:
     """The number of pictures, or frames of an outside detector, that were available."""
     found: int
     """The number of boxes that stage 1 detected or was given."""
+    outside: int
+    """The number of boxes that stage 1 rejected, since nobody in the room looks like them by size
+    and place."""
     passed: int
-    """The number of boxes that stage 1 passed on: those with a sufficient score at a possible
-    place in the room."""
+    """The number of boxes that stage 1 passed on; a method's own estimates may be more than it
+    found."""
     together: int
     """The number of steps at which two cameras or more passed on a box."""
+    pairs: int
+    """The number of pairs of boxes passed on that could be of one person."""
     begun: int
     """The number of tracks that the fusion began, whatever their existence."""
     surest: float
@@ -41,11 +49,14 @@ def count_stages(run: Run) -> StageCounts:
     passed = np.zeros((len(cameras), len(run.views)), dtype=np.int64)
     for camera in cameras:
         passed[camera] = run.views.column("boxes", camera).counts
+    outside = sum(one.dropped.get(OUTSIDE, 0.0) * one.pictures for one in count_gates(run))
     return StageCounts(
         frames=sum(not blind for camera in cameras for blind in run.views.values("blind", camera)),
         found=sum(len(run.views.column("measurements", camera).values) for camera in cameras),
+        outside=round(outside),
         passed=int(passed.sum()),
         together=int(((passed > 0).sum(axis=0) > 1).sum()),
+        pairs=sum(int(np.minimum(*two).sum()) for two in itertools.combinations(passed, 2)),
         begun=len(np.unique(run.fused.column("posterior.labels").values)),
         surest=float(run.fused.column("posterior.weights").values.max(initial=0.0)),
         tracks=len(set(run.tracks.ids.tolist())),
@@ -83,8 +94,10 @@ def _losing_stage(run: Run, n: StageCounts) -> str:
                 "and what values it wants its pictures in"
             )
         return f"{head}; lower what a box must have to count, or teach what people look like"
-    head += f", {n.passed} of them passed on to the fusion"
+    head += f", {n.passed} passed on to the fusion"
     if n.passed < _NEARLY_NONE * n.found:
+        if 2 * n.outside < n.found:
+            return f"{head}: {run.parameters.single_view} itself holds them back; see its values"
         return (
             f"{head}: nearly none can stand in [room] by its size and place; "
             "multiview-phd check tells whether calibration, unit, room or size are wrong"
@@ -95,17 +108,19 @@ def _losing_stage(run: Run, n: StageCounts) -> str:
     if not alone and not n.together:
         return f"{head}: a track begins where boxes of two cameras meet; see the cameras' clocks"
     head += f", {n.begun} tracks begun"
+    if len(run.filtered):
+        return (
+            f"{head}: the smoothing removed all tracks of the filter as clutter; choose the "
+            "smoothing none to see them"
+        )
+    if not alone and n.pairs < LEAST_POSSIBLE:
+        return f"{head}: these are too few boxes to tell why; track more steps of the recording"
     if not n.begun:
         where = "the boxes are" if alone else "boxes of different cameras meet"
         late = "" if alone else ", or which camera is late"
         return (
             f"{head}: {where} nowhere in [room]; multiview-phd check tells how the calibration is "
             f"meant{late}"
-        )
-    if len(run.filtered):
-        return (
-            f"{head}: the smoothing removed all tracks of the filter as clutter; choose the "
-            "smoothing none to see them"
         )
     return (
         f"{head}, the surest with existence {n.surest:.2f}, below the extraction threshold or "

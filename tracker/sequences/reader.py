@@ -103,8 +103,7 @@ def read_sequence(folder: Path | str) -> Sequence:
         room, half_extents, remarks = find_room(views, room, half_extents, fields)
         reading.warnings += remarks
     reading.warnings += time.remarks
-    for view in views:
-        reading.warnings += check_view_of_room(view.camera, room)
+    reading.warnings += check_view_of_room([view.camera for view in views], room)
     templates = read_templates(fields, views, time.steps)
     ground_truth = read_ground_truth(fields, reading, time.steps)
     files = _states(folder, reading.files)

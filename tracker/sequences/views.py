@@ -97,14 +97,17 @@ def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camer
     )
 
 
-def check_view_of_room(camera: Camera, room: Room) -> Iterator[str]:
-    """Yield a warning if a camera sees nothing of the room, usually since its pose is inverted."""
+def check_view_of_room(cameras: Many[Camera], room: Room) -> Iterator[str]:
+    """Yield a warning if cameras see nothing of the room, usually since a pose is inverted."""
     steps = np.linspace(0.0, 1.0, 13)
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
-    if not camera.sees(room.minimum + grid * (room.maximum - room.minimum)).any():
+    points = room.minimum + grid * (room.maximum - room.minimum)
+    blind = [camera.name for camera in cameras if not camera.sees(points).any()]
+    if blind:
         yield (
-            f'camera "{camera.name}" sees nothing of the room: check that R and t lead from world '
-            "to camera (x_cam = R x_world + t), that t is in metres, and [room]"
+            f"{listed(blind)} {'sees' if len(blind) == 1 else 'see'} nothing of the room: check "
+            "that R and t lead from world to camera (x_cam = R x_world + t), that t is in metres, "
+            "and [room]"
         )
 
 

@@ -17,7 +17,7 @@ from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
 from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
-from tracker.single_view.protocol import Dropped, ViewResult
+from tracker.single_view.protocol import OUTSIDE, Dropped, ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
@@ -59,7 +59,7 @@ class Detected:
     @property
     def dropped(self) -> Dropped:
         """The boxes that contradict the room."""
-        return Dropped.of(self.boxes, {"a place outside the room": ~self.plausible})
+        return Dropped.of(self.boxes, {OUTSIDE: ~self.plausible})
 
     @property
     def result(self) -> ViewResult:

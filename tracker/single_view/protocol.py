@@ -20,9 +20,12 @@ CANDIDATES, DROPPED = "candidates", "dropped for "
 """Names in a result's information: the number of candidates, and, followed by the name of a gate,
 the number that it rejected."""
 
+OUTSIDE = "a place outside the room"
+"""The gate at boxes that are of nobody in the room by their size and place."""
+
 GATES = (
     "colour", "foreground", "surroundings", "shape", "another at its place", "another's shoulders",
-    "outline", "a place outside the room",
+    "outline", OUTSIDE,
 )  # fmt: skip
 """All gates that methods may have, by number."""
 

@@ -161,6 +161,10 @@ function shelf(on) {
 		text: () => find.value.trim(),
 		reveal: () =>
 			list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" }),
+		/** Where the chosen one is not what is sought, the first that is takes its place. */
+		follow() {
+			if (!list.querySelector('[aria-selected="true"]')) list.querySelector("button")?.click();
+		},
 		/**
 		 * From one to the next by an arrow; whether the key was one of the list's.
 		 * @param {KeyboardEvent} event
@@ -177,8 +181,9 @@ function shelf(on) {
 		/**
 		 * @param {Server.LibraryInfo} library
 		 * @param {Server.RecordingInfo | null} recording  whose runs are listed
+		 * @param {boolean} [held]  it stays though its name is not what is sought: a run of it is
 		 */
-		show(library, recording) {
+		show(library, recording, held = true) {
 			const text = this.text();
 			const walked = list.contains(document.activeElement);
 			const where = whereabouts(library.recordings);
@@ -190,7 +195,9 @@ function shelf(on) {
 						.filter(
 							(one) =>
 								one.kind === kind &&
-								(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
+								(!text ||
+									has(text, [one.name, one.place]) ||
+									(held && one.place === recording?.place)),
 						);
 					const head = h("div.cap", h("span", word), h("span", "runs"));
 					const items = found.map((one) =>
@@ -237,7 +244,7 @@ export function mountLibrary(root, { store, actions }) {
 		choose: (one) => void choose(one),
 		open: openRecording,
 		add: () => actions.openSheet(),
-		find: () => show(),
+		find: () => (show(), recordings.follow()),
 	});
 	const small = preview({ store, actions }, (run, note) => void change(run, { note }));
 	const bar = chosenBar({
@@ -303,7 +310,7 @@ export function mountLibrary(root, { store, actions }) {
 		// Who is writing a name goes on; what is news by then is drawn after it.
 		if (!library || writing) return;
 		const matching = listed();
-		recordings.show(library, recording);
+		recordings.show(library, recording, matching.length > 0);
 		fill(title, recording ? `Runs of ${recording.name}` : "Runs");
 		fill(
 			sub,

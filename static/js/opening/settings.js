@@ -82,7 +82,11 @@ export function roomPart(info, moved) {
 			segment("Unit", ["mm", "cm", "m"], info.unit, "unit"),
 		),
 		label("How the files are read", isRead ? "as you say" : "found"),
-		choice("Poses", "pose", wish.pose, info.pose, ["world-to-camera", "camera-to-world"]),
+		choice("Poses", "pose", wish.pose, info.pose, [
+			"world-to-camera",
+			"camera-to-world",
+			"transposed",
+		]),
 		choice("Axes", "axes", wish.axes, info.axes, ["opencv", "opengl"]),
 		info.cameras.some(({ detections }) => detections) && [
 			choice("Boxes", "boxes", wish.boxes, info.boxes, LAYOUTS),

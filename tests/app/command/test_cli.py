@@ -477,6 +477,17 @@ def test_checks_as_json_say_what_the_table_says(run: Runs, tmp_path: Path) -> No
     assert run("check", folder, "--json")[0] == status == 1
 
 
+def test_cameras_that_see_nothing_are_named_once(run: Runs, tmp_path: Path) -> None:
+    folder = write_crossing(tmp_path / "crossing", frames=20)
+    file = folder / "sequence.toml"
+    text = file.read_text(encoding="utf-8")
+    text = re.sub(r"min = .*", "min = [500.0, 500.0, 0.0]", text)
+    file.write_text(re.sub(r"max = .*", "max = [504.0, 504.0, 2.0]", text), encoding="utf-8")
+    checked = run("check", folder)[1]
+    tracked = run("track", folder, "-o", tmp_path / "tracks.csv")[2]
+    assert checked.count("nothing of the room") == tracked.count("nothing of the room") == 1
+
+
 @pytest.mark.full
 def test_a_batch_goes_on_without_a_recording_that_is_missing(
     run: Runs, crossing: Path, tmp_path: Path

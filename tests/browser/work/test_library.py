@@ -128,8 +128,18 @@ def test_finding_leaves_what_matches(library: Page) -> None:
     library.keyboard.type("no such run")
     expect(library.locator("tr[data-run]:visible")).to_have_count(0)
     expect(library.get_by_text("No run matches")).to_be_visible()
+    expect(library.locator(".lib .item")).to_have_count(0)
     library.keyboard.press("Escape")
     expect(library.locator("tr[data-run]:visible")).to_have_count(2)
+
+
+def test_a_recording_that_is_found_is_chosen_where_no_run_is(library: Page) -> None:
+    library.get_by_label("Find", exact=True).fill("room24")
+    items = library.get_by_role("listbox", name="Recordings").get_by_role("option")
+    expect(items).to_have_count(1)
+    expect(items).to_contain_text("room24-2p")
+    expect(items).to_have_attribute("aria-selected", "true")
+    expect(library.get_by_role("heading", name="Runs of room24-2p")).to_be_visible()
 
 
 def test_arrows_go_on_from_the_run_that_was_clicked(library: Page) -> None:

@@ -354,6 +354,8 @@ def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: 
     expect(sheet.locator(".rec", has_text="room44-3p")).to_be_visible()
     sheet.get_by_label("Find by name").fill("numb")
     expect(sheet.locator(".rec", has_text="room44-3p")).to_be_hidden()
+    expect(sheet.get_by_role("heading", name="Built-in rooms")).to_be_hidden()
+    expect(sheet.get_by_role("heading", name="Recent")).to_be_visible()
     sheet.get_by_label("Path").fill(str(folder / "nowhere"))
     sheet.get_by_role("button", name="Open", exact=True).click()
     expect(sheet.get_by_role("alert")).to_contain_text("there is no such file or folder")
@@ -374,6 +376,7 @@ def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: 
     find.fill("room44")  # before the list is there, or after
     expect(sheet.locator(".rec", has_text="room44-3p")).to_be_visible()
     expect(own.first).to_be_hidden()
+    expect(sheet.get_by_role("heading", name="Recent")).to_be_hidden()
     find.press("Enter")  # the first that is found
     expect(sheet).not_to_be_visible()
     server.wait(lambda now: now["sequence"]["name"] == "room44-3p")

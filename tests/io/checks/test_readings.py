@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import short
-from tests.mistakes import MISTAKES, y_up
+from tests.mistakes import MISTAKES, transposed, y_up
 from tests.random_rooms import random_room
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
@@ -53,6 +53,11 @@ def test_each_usual_mistake_is_named_with_its_remedy(name: str) -> None:
     make, remedy = MISTAKES[name]
     named = [warnings(make(random_room(seed, steps=150))) == [remedy] for seed in ROOMS]
     assert sum(named) >= len(ROOMS) - 1
+
+
+@pytest.mark.parametrize("seed", short(ROOMS, 2))
+def test_rotations_that_are_transposed_are_named(seed: int) -> None:
+    assert warnings(transposed(random_room(seed, steps=150))) == ["--pose transposed"]
 
 
 @pytest.mark.full

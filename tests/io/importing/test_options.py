@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -18,12 +19,13 @@ from tests.io.read.recorded import assert_boxes, detections, settled_of, toml, v
 from tests.io.read.rig import SIZE, cameras
 from tracker.io.checks import check
 from tracker.io.conventions.questions import Undecided, Unexplained
+from tracker.io.conventions.reading import Reading
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.writing import as_sequence, write
-from tracker.io.read.pieces import FormatError, Unit, Up
-from tracker.sequences.finding import Remedy
+from tracker.io.read.pieces import Direction, FormatError, Layout, Unit, Up
+from tracker.sequences.finding import Remedy, warning
 from tracker.sequences.reader import read_sequence
 
 
@@ -234,6 +236,50 @@ def test_poses_that_were_told_wrongly_are_not_taken(tmp_path: Path, options: Imp
     assert settled.open is not None
     write(settled, tmp_path / "out", "accepted")
     assert "--accept-best" in (tmp_path / "out" / "sequence.toml").read_text().splitlines()[0]
+
+
+def _corners(ltwh: ndarray) -> ndarray:
+    return np.hstack([ltwh[:, :2], ltwh[:, :2] + ltwh[:, 2:]])
+
+
+def _middles(ltwh: ndarray) -> ndarray:
+    return np.hstack([ltwh[:, :2] + ltwh[:, 2:] / 2.0, ltwh[:, 2:]])
+
+
+@pytest.mark.parametrize(
+    ("head", "written", "holds", "names"),
+    [
+        ("frame,left,top,width,height", _corners, "xyxy", "ltwh"),
+        ("frame,left,top,width,height", _middles, "cxcywh", "ltwh"),
+    ],
+)
+def test_a_header_that_the_boxes_contradict_is_asked_about(
+    tmp_path: Path, head: str, written: Callable[[ndarray], ndarray], holds: Layout, names: Layout
+) -> None:
+    toml(tmp_path)
+    detections(tmp_path, head=head, written=written)
+    with pytest.raises(Undecided, match="the files name the boxes' numbers") as asked:
+        settled_of(tmp_path)
+    assert asked.value.question.code == "layout"
+    assert asked.value.question.flags == (f"--boxes {holds}", f"--boxes {names}")
+    assert_boxes(settled_of(tmp_path, ImportOptions(boxes=holds)))
+    assert_boxes(settled_of(tmp_path, ImportOptions(accept_best=True)))
+
+
+@pytest.mark.parametrize(
+    ("read", "named", "remedy"),
+    [
+        ("world-to-camera", "transposed", "--pose transposed"),
+        ("transposed", "transposed", "--pose world-to-camera"),
+        ("camera-to-world", "camera-to-world", "--pose world-to-camera"),
+        ("camera-to-world", "transposed", None),
+    ],
+)
+def test_a_pose_that_was_stated_wrongly_is_mended_by_the_flag_that_undoes_it(
+    read: Direction, named: str, remedy: str | None
+) -> None:
+    told = for_import(warning("poses", "", Remedy("--pose", named)), Reading(direction=read))
+    assert [str(one) for one in told.remedies] == ([] if remedy is None else [remedy])
 
 
 def test_an_import_asks_and_refuses_with_a_status_of_its_own(

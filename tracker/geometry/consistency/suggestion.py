@@ -30,6 +30,9 @@ LEAST_AGREEING = 20
 rooms with the boxes of other rooms, five steps have at most 7 by chance and twenty at most 23;
 with the right boxes two steps have 20 in the median."""
 
+LEAST_POSSIBLE = 3 * LEAST_AGREEING
+"""Number of pairs of boxes that could agree below which it tells nothing that few of them do."""
+
 # The sensitivities below are measured in the random rooms of seeds 1500 … 1519, of whose people
 # some are 1.2 m tall and some are seen for 12 steps alone, and in four recordings.
 _SHORTEST_STANDING = 1.45

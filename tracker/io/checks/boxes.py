@@ -12,7 +12,13 @@ import numpy as np
 
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
-from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
+from tracker.geometry.consistency.suggestion import (
+    LEAST_AGREEING,
+    LEAST_POSSIBLE,
+    Suggestion,
+    stands,
+    suggest,
+)
 from tracker.io.conventions.judge import (
     LEAST_SHARE,
     Judge,
@@ -205,7 +211,8 @@ def _mistake(sequence: Sequence, judged: JudgedBoxes) -> Check:
     words: list[str] = []
     remedies = stating_flags(reading, AS_GIVEN, names)
     if reading.direction != "world-to-camera":
-        words.append("the poses inverted")
+        transposed = reading.direction == "transposed"
+        words.append("R transposed" if transposed else "the poses inverted")
     if reading.axes != "opencv":
         words.append("OpenGL's camera axes (y up, z back)")
     if reading.layout != "ltwh":
@@ -249,7 +256,7 @@ def _mistake(sequence: Sequence, judged: JudgedBoxes) -> Check:
 
 def _nothing_meets(judged: JudgedBoxes) -> Check:
     agreed = judged.given.consensus
-    few = agreed.possible < 3 * LEAST_AGREEING
+    few = agreed.possible < LEAST_POSSIBLE
     if few or judged.verdict.kind in ("open", "unproven"):
         return absent(
             "boxes meet in 3D", "too few boxes meet to tell how calibration and boxes are meant"

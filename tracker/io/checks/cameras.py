@@ -11,6 +11,7 @@ from tracker.geometry.camera import Camera
 from tracker.sequences.fields import listed
 from tracker.sequences.finding import Check, good, percent, warning
 from tracker.sequences.sequence import Room
+from tracker.sequences.views import check_view_of_room
 
 # The 46 cameras of 12 recordings (CMC, WILDTRACK, AV16.3, Pose2Sim's demonstration, the built-in
 # rooms) are well within: off by at most 0.16, 36° to 85° wide, fx 0.91 to 1.01 times fy.
@@ -72,18 +73,13 @@ def check_places(cameras: Many[Camera], room: Room) -> Iterator[Check]:
     steps = np.linspace(0.0, 1.0, 9)
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
     points = room.minimum + grid * (room.maximum - room.minimum)
-    seen = np.array([camera.sees(points) for camera in cameras])
-    blind = [c.name for c, own in zip(cameras, seen, strict=True) if not own.any()]
-    if blind:
-        yield warning(
-            "cameras see the room",
-            f"{listed(blind)} {'sees' if len(blind) == 1 else 'see'} nothing of the room: check "
-            "that R and t lead from world to camera, that t is in metres, and the room",
-        )
-    else:
+    for sentence in (blind := list(check_view_of_room(cameras, room))):
+        yield warning("cameras see the room", sentence)
+    if not blind:
         yield good("cameras see the room", "every camera sees a part of the room")
     if len(cameras) < 2:
         return
+    seen = np.array([camera.sees(points) for camera in cameras])
     shared = float((seen.sum(axis=0) >= 2).mean())
     if shared < _LEAST_SHARED:
         yield warning(

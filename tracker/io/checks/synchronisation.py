@@ -113,7 +113,7 @@ def solve(
     for a, b in curves:
         near[a, b] = _near(pairings[a, b], found[b] - found[a])
     found = _ascend_finely(found, near, weights, fine)
-    found = found - _usual(found)
+    found = found - common_offset(found)
     offsets: list[Offset | None] = []
     for camera in range(cameras):
         if any(camera in key for key in curves):
@@ -253,8 +253,8 @@ def _ascend_finely(
     return start + moves
 
 
-def _usual(found: Float[ndarray, " C"]) -> float:
-    """The offset that most cameras share; of two cameras that of the first."""
+def common_offset(found: Float[ndarray, " C"]) -> float:
+    """The offset, steps, that most cameras share; of two cameras that of the first."""
     same = np.abs(found[:, None] - found[None, :]) < _SAME
     reference = int(np.argmax(same.sum(axis=1)))
     return (

@@ -100,6 +100,8 @@ class Open:
     directions: tuple[Direction, ...] = get_args(Direction)
     axes: tuple[Axes, ...] = get_args(Axes)
     layouts: tuple[Layout, ...] = get_args(Layout)
+    alternatives: tuple[Layout, ...] = ()
+    """Layouts that are tried though the files name another one."""
     parts: tuple[int, ...] = (0, 1)
     finer: tuple[int, ...] = (100, 1000)
     """Parts of the picture's size that are tried besides pixels."""
@@ -361,8 +363,11 @@ def restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -
         if largest <= parts and any(abs(side / parts - 1.0) > _SAME_SIZE for side in sum(known, ()))
     )
     tried = replace(tried, finer=finer)
-    sizes = tuple(layout for layout in tried.layouts if layout not in ("xyxy", "yxyx"))
-    if sizes and len(four) and (four[:, 2:] > four[:, :2]).all(axis=1).mean() < 0.99:
+    if len(four) and (four[:, 2:] > four[:, :2]).all(axis=1).mean() < 0.99:
         # a right edge left of the left one, or a lower one above the upper
-        tried = replace(tried, layouts=sizes)
+        named, alternatives = (
+            tuple(layout for layout in own if layout not in ("xyxy", "yxyx"))
+            for own in (tried.layouts, tried.alternatives)
+        )
+        tried = replace(tried, layouts=named or tried.layouts, alternatives=alternatives)
     return tried

@@ -106,14 +106,17 @@ def check_verdict(
     cameras: Sequence[RawCamera],
     stated: str = "",
     otherwise: Verdict | None = None,
+    named: Layout | None = None,
 ) -> Undecided | Unexplained | None:
-    """Return what is to be asked, or why to refuse, where the boxes do not decide.
+    """Return what is to be asked, or why to refuse, where the boxes do not decide, or contradict
+    what their files say of them.
 
     Args:
         verdict: What they tell.
         cameras: As they are given.
         stated: The flags that leave no interpretation that explains the boxes.
         otherwise: What the boxes tell without these.
+        named: The layout of the boxes by their files; None where these leave it open.
     """
     names = [camera.name for camera in cameras]
     best = verdict.best.reading
@@ -139,6 +142,12 @@ def check_verdict(
             f"{share:.0f} % are explained by another camera's; "
             f"mirror pictures and boxes; {ACCEPT} imports them as they are"
         )
+    if verdict.kind in ("decided", "open") and named not in (None, best.layout):
+        return Undecided(_question(
+            best, replace(best, layout=named), names,
+            f"the files name the boxes' numbers {LAYOUTS[named]}, but {share:.0f} % of a camera's "
+            f"boxes are explained by another camera's if they are {LAYOUTS[best.layout]}",
+        ))  # fmt: skip
     if verdict.kind == "open" and verdict.rival is not None:
         return Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
     return None
@@ -159,10 +168,15 @@ def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Q
              "mirrored": "handedness of the world", "flipped": "left and right of the pictures",
              "pixels": "size of the pictures"}  # fmt: skip
     what = " and ".join(words[part] for part in differing) or "the scene"
+    return _question(best, rival, names, f"the files leave open {what} ({sure})")
+
+
+def _question(best: Reading, rival: Reading, names: Sequence[str], difference: str) -> Question:
+    differing = _differing(best, rival)
     return Question(
         differing[0] if differing else "scene",
         (in_words(best, names, differing), in_words(rival, names, differing)),
-        f"the files leave open {what} ({sure})",
+        difference,
         (_flags(best, rival, names), _flags(rival, best, names)),
     )
 

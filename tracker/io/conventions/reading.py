@@ -75,6 +75,7 @@ def _pose(camera: RawCamera, reading: Reading) -> Pose:
     if reading.direction == "camera-to-world":
         rotation, centre = rotation.T, translation
     else:
+        rotation = rotation.T if reading.direction == "transposed" else rotation
         centre = -rotation.T @ translation
     if reading.axes == "opengl":
         rotation = FLIP @ rotation

@@ -63,7 +63,8 @@ NAME_PRIOR = {"name": 7.0, "number": 3.0, "order": 1.0}
 Plane = tuple[Float[ndarray, "N 4"], Float[ndarray, " N"]]
 
 RARE = 7.0
-"""Nats against a mirrored world, mirrored pictures, and pictures of another size than stated."""
+"""Nats against a mirrored world, mirrored pictures, pictures of another size than stated, and boxes
+of another layout than their files name."""
 
 _MOST_PAIRS, _MOST_PAIRS_FIRST = 2000, 600  # of boxes of two cameras, in all and at first
 _MOST_COMPARED = 16  # interpretations that are compared by all moments
@@ -483,7 +484,7 @@ def _candidates(
     ]
     if not found or found[0].evidence.share < _EXPLAINED:
         rivals = readings  # any of them may explain the boxes in a mirror or of other pictures
-    found += _scored(likelihood, list(_questioned(rivals, pixels, open_.finer)), -RARE)
+    found += _scored(likelihood, list(_questioned(rivals, pixels, open_)), -RARE)
     if open_.orders:
         best = max(found, key=lambda one: one.score, default=None)
         if best is None or best.prior < 0.0 or best.evidence.share < _PLAINLY:
@@ -599,17 +600,16 @@ def _scored(likelihood: Likelihood, readings: Many[Reading], prior: float) -> li
     return sorted((one for one in found if one is not None), key=lambda one: -one.score)
 
 
-def _questioned(
-    readings: Many[Reading], pixels: Many[float], finer: Many[int]
-) -> Iterator[Reading]:
-    """Readings in a mirrored world, with mirrored pictures, for pictures of another size, and with
-    boxes in parts of it."""
+def _questioned(readings: Many[Reading], pixels: Many[float], open_: Open) -> Iterator[Reading]:
+    """Readings in a mirrored world, with mirrored pictures, with boxes of another layout, for
+    pictures of another size, and with boxes in parts of it."""
     for reading in readings:
         yield replace(reading, mirrored=True)
         yield replace(reading, flipped=True)
+        yield from (replace(reading, layout=layout) for layout in open_.alternatives)
         if not reading.parts:
             yield from (replace(reading, pixels=factor) for factor in pixels)
-            yield from (replace(reading, parts=parts) for parts in finer)
+            yield from (replace(reading, parts=parts) for parts in open_.finer)
 
 
 def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> list[Interpretation]:

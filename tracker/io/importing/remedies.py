@@ -20,8 +20,6 @@ _LEAST_HEIGHT, _MOST_HEIGHT = 1.0, 2.2
 """Metres: boxes of people who sit or stand."""
 
 _OTHER = {
-    "world-to-camera": "camera-to-world",
-    "camera-to-world": "world-to-camera",
     "opencv": "opengl",
     "opengl": "opencv",
 }
@@ -68,7 +66,11 @@ def _larger(check: Check, height: float, unit: Unit) -> Check:
 def _for_import(remedy: Remedy, reading: Reading) -> Remedy | None:
     match remedy.flag:
         case "--pose":
-            return replace(remedy, value=_OTHER[reading.direction])
+            if reading.direction == "world-to-camera":
+                return remedy
+            # each way undoes itself; one after the other is no usual way
+            undone = remedy.value == reading.direction
+            return replace(remedy, value="world-to-camera") if undone else None
         case "--axes":
             return replace(remedy, value=_OTHER[reading.axes])
         case "--unit":

@@ -272,8 +272,21 @@ class _PlanDraft:
 
     # the boxes as their files have them
 
+    @property
+    def _named(self) -> Layout | None:
+        """The layout that the files of all cameras name for boxes in pixels, which is not stated.
+
+        A header may name another one than its columns hold: the boxes tell.
+        """
+        pieces = [camera.detections for camera in self.matched.cameras if camera.detections]
+        named = {piece.layout for piece in pieces}
+        stated = self.options.normalised
+        in_parts = any(piece.normalised if stated is None else stated for piece in pieces)
+        alike = len(named) == 1 and not in_parts and self.options.boxes is None
+        return named.pop() if alike else None
+
     def _boxes_in_pixels(self) -> list[_Boxes | None]:
-        """Read the boxes, those of a known layout as left, top, width, height."""
+        """Read the boxes, those of a layout that is not in question as left, top, width, height."""
         first = self._first_index()
         boxes: list[_Boxes | None] = []
         outside, rows, example = 0, 0, ""
@@ -326,7 +339,7 @@ class _PlanDraft:
             first: The number of the first frame.
             there: Whether the recording has a box's frame.
         """
-        layout = self.options.boxes or piece.layout
+        layout = self.options.boxes or (None if self._named else piece.layout)
         stated = self.options.normalised
         scale = size if (piece.normalised if stated is None else stated) else None
         four = piece.boxes if layout is None else read_boxes(piece.boxes, layout, scale)
@@ -365,7 +378,9 @@ class _PlanDraft:
             otherwise = find([*self.given, *self.spare]) if stated else None
             if otherwise is not None and otherwise.kind not in ("decided", "open"):
                 otherwise = None
-            question = check_verdict(verdict, [*self.raws, *self.spare], stated, otherwise)
+            question = check_verdict(
+                verdict, [*self.raws, *self.spare], stated, otherwise, self._named
+            )
         if question is not None or verdict is None or verdict.kind == "unproven":
             self._accept(question, seen)
         if sum(own is not None for own in seen) == 1:
@@ -391,9 +406,18 @@ class _PlanDraft:
                 "numbers are meant is not said: --boxes says it"
             )
         layouts: tuple[Layout, ...] = get_args(Layout) if unknown else ("ltwh",)
+        alternatives: tuple[Layout, ...] = ()
+        if self._named:
+            alternatives = tuple(layout for layout in layouts if layout != self._named)
+            layouts = (self._named,)
         own = self.options
         orders = not own.swap and not own.cameras and not own.as_named
-        return Open(layouts=layouts, parts=(int(True in in_parts),), orders=orders)
+        return Open(
+            layouts=layouts,
+            alternatives=alternatives,
+            parts=(int(True in in_parts),),
+            orders=orders,
+        )
 
     def _accept(
         self, question: Undecided | Unexplained | None, seen: Sequence[Seen | None]
@@ -417,6 +441,7 @@ class _PlanDraft:
         """Return how the files are meant by where the cameras look."""
         check_turns(self.raws)
         reading = read_poses(self.raws, boxes=any(own is not None for own in self.boxes))
+        reading = replace(reading, layout=self._named or reading.layout)
         return _Meaning(reading, "from where the cameras look; the boxes do not tell")
 
     def read_boxes(self, verdict: Verdict) -> _Meaning:
@@ -432,7 +457,8 @@ class _PlanDraft:
             lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
             reading = replace(reading, lean=lean)
         why = f"since {100.0 * best.consensus.share:.0f} % of the boxes meet so"
-        if any(own is not None and own.layout is None for own in self.boxes):
+        in_question = any(own is not None and own.layout is None for own in self.boxes)
+        if in_question and reading.layout != self._named:
             self._note("boxes", f"{reading.layout}, {why}; --boxes")
         wider = 1.0
         if any(camera.picture_size is not None for camera in self.matched.cameras):

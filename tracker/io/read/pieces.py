@@ -23,7 +23,9 @@ from numpy import ndarray
 from tracker.geometry.calibration import Lens
 
 Unit = Literal["m", "cm", "mm"]
-Direction = Literal["world-to-camera", "camera-to-world"]
+Direction = Literal["world-to-camera", "camera-to-world", "transposed"]
+"""What R and t map: x_camera = R x_world + t; x_world = R x_camera + t; or the first with R
+transposed, as of points in rows, x_cameraᵀ = x_worldᵀ R + tᵀ, and of files column by column."""
 Axes = Literal["opencv", "opengl"]
 """The axes of a camera: x right, y down, z ahead (OpenCV); or x right, y up, z back (OpenGL)."""
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
