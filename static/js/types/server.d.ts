@@ -640,9 +640,10 @@ declare namespace Server {
 		/** Axis of the calibration's world that points up. */
 		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
 		/**
-		 * What R and t map: points of the world to the camera, or points of the camera to the world.
+		 * What R and t map: points of the world to the camera, points of the camera to the world, or
+		 * the first with R transposed, as of points in rows.
 		 */
-		pose: "world-to-camera" | "camera-to-world" | null;
+		pose: "world-to-camera" | "camera-to-world" | "transposed" | null;
 		/** Axes of a camera: y down and z ahead, or y up and z back. */
 		axes: "opencv" | "opengl" | null;
 		/**
