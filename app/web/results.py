@@ -249,7 +249,7 @@ class SequenceEntryInfo(Model):
     description: str
     kind: Literal["rendered", "folder"]
     folder: str
-    """That of what is open: the name of a recording need not be that of its folder."""
+    """The folder that it lies in, whose name need not be that of the recording."""
     cameras: int | None
     frames: int | None
     error: str | None = None

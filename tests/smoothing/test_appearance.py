@@ -368,13 +368,13 @@ PEOPLE_STEP = 0.2
 FIRST, SECOND = [0.9, 0.1], [0.1, 0.9]
 
 
-def told(
+def evidence_of(
     likenesses: list[list[float]],
     places: list[list[float]],
     weight: float = 1.0,
     share: float = 1.0,
 ) -> ndarray:
-    """Of one piece whose boxes a camera shows, the first of the boxes of each step."""
+    """The evidence of one tracklet; its own box is the first of those of each step."""
     steps = len(likenesses)
     boxes = np.array([[x, 50.0, 5.0, 10.0] for own in places for x in own])
     starts = np.cumsum([0, *(len(own) for own in places)])
@@ -397,26 +397,26 @@ def told(
 
 
 def test_boxes_of_ones_colours_count_by_the_time_that_they_last() -> None:
-    found = told([FIRST] * 10, [[50.0]] * 10)
+    found = evidence_of([FIRST] * 10, [[50.0]] * 10)
     own, other = (10 * PEOPLE_STEP * np.log(0.1 + 0.9 * 2.0 * p) for p in (0.9, 0.1))
     assert found == pytest.approx([0.0, other - own])
-    assert told([FIRST] * 10, [[50.0]] * 10, 0.5) == pytest.approx(found / 2.0)
+    assert evidence_of([FIRST] * 10, [[50.0]] * 10, 0.5) == pytest.approx(found / 2.0)
     # and by how surely they are the own
-    assert told([FIRST] * 10, [[50.0]] * 10, share=0.8) == pytest.approx(0.8 * found)
-    assert not told([FIRST] * 10, [[50.0]] * 10, share=0.7).any()
+    assert evidence_of([FIRST] * 10, [[50.0]] * 10, share=0.8) == pytest.approx(0.8 * found)
+    assert not evidence_of([FIRST] * 10, [[50.0]] * 10, share=0.7).any()
 
 
 def test_boxes_that_look_now_like_one_and_now_like_the_other_tell_less_but_no_stranger() -> None:
-    found = told([FIRST, FIRST, SECOND], [[50.0]] * 3)
-    once = told([FIRST], [[50.0]])
+    found = evidence_of([FIRST, FIRST, SECOND], [[50.0]] * 3)
+    once = evidence_of([FIRST], [[50.0]])
     assert found.max() == 0.0
     assert found == pytest.approx(once)
 
 
 def test_what_another_box_touches_says_nothing_of_colours() -> None:
     alone, crowded = [[50.0]] * 5, [[50.0, 56.0]] * 5
-    assert told([SECOND] * 5 + [FIRST] * 5, alone + crowded) == pytest.approx(
-        told([SECOND] * 5, alone)
+    assert evidence_of([SECOND] * 5 + [FIRST] * 5, alone + crowded) == pytest.approx(
+        evidence_of([SECOND] * 5, alone)
     )
 
 

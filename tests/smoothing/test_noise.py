@@ -250,7 +250,7 @@ def test_a_path_of_a_single_row_tells_nothing_of_the_noise() -> None:
 def test_windows_of_which_two_cameras_see_half_are_chosen(
     windows: list[tuple[int, int]], chosen: list[int]
 ) -> None:
-    """Of each window: its rows, and of how many two cameras see the person."""
+    """A window is given as its rows, and in how many of them two cameras see the person."""
     paths = paths_of(*[length for length, _ in windows])
     counts = np.concatenate([np.where(np.arange(length) < seen, 2, 1) for length, seen in windows])
     rows = choose_rows(paths, counts)

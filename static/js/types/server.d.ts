@@ -1215,7 +1215,7 @@ declare namespace Server {
 		name: string;
 		description: string;
 		kind: "rendered" | "folder";
-		/** That of what is open: the name of a recording need not be that of its folder. */
+		/** The folder that it lies in, whose name need not be that of the recording. */
 		folder: string;
 		cameras: number | null;
 		frames: number | null;
