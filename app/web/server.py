@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 import socket as sockets
 from collections.abc import Callable
@@ -321,3 +322,18 @@ class _Server(uvicorn.Server):
         await super().startup(sockets=sockets)
         if self.started:
             self._on_ready()
+
+    async def shutdown(self, sockets: list[sockets.socket] | None = None) -> None:
+        logger = logging.getLogger("uvicorn.error")
+        logger.addFilter(_is_failure)
+        try:
+            await super().shutdown(sockets=sockets)
+        finally:
+            logger.removeFilter(_is_failure)
+
+
+def _is_failure(record: logging.LogRecord) -> bool:
+    """Whether a log entry says more than that whoever was still served at the end is cancelled."""
+    error = record.exc_info[0] if record.exc_info else None
+    cancelled = error is not None and issubclass(error, asyncio.CancelledError)
+    return not (cancelled or str(record.msg).startswith("Cancel "))

@@ -22,6 +22,7 @@ from typing import Any
 import httpx
 import pytest
 import viser
+from fastapi import FastAPI
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
@@ -207,6 +208,32 @@ def test_more_connections_than_are_meant_are_turned_away(
         assert len(open_now) <= 20
     wait_until(lambda: len(open_now) < 10, LATER)
     running.answers()
+
+
+def test_who_is_still_served_when_the_server_ends_is_cancelled_without_a_word(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    app, asked, ready = FastAPI(), threading.Event(), threading.Event()
+
+    @app.get("/endless")
+    async def endless() -> None:
+        asked.set()
+        await asyncio.sleep(3600.0)
+
+    monkeypatch.setattr(server, "_Server", Stoppable)
+    monkeypatch.setattr(Stoppable, "newest", None)  # that of the others is so again afterwards
+    listener = server.bind("127.0.0.1", 0)
+    thread = threading.Thread(target=server.serve, args=(app, listener, ready.set), daemon=True)
+    thread.start()
+    assert ready.wait(LATER)
+    with closing(socket.create_connection(listener.getsockname()[:2], LATER)) as there:
+        there.sendall(b"GET /endless HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert asked.wait(LATER)
+        assert Stoppable.newest is not None
+        Stoppable.newest.should_exit = True
+        thread.join(LATER)
+    assert not thread.is_alive()
+    assert capfd.readouterr().err == ""
 
 
 UPGRADE = (
