@@ -37,6 +37,8 @@ slider is dragged or a number is typed, changes from elsewhere do not overwrite 
   in the table.
 - The arrow of a changed row resets it, *Reset all* resets every value and method; *Save as* stores
   all values as a preset.
+- A recording opens with the values it was left with, also when the workbench starts on it; `track`
+  always begins with the defaults.
 - *Effect* above the table runs the recording with a few other values of each of the first twelve
   listed parameters, in the background, while nothing else is computed. Each row then
   shows the curve of MOTA (without ground truth: of the number of tracks) over the values, and the
