@@ -39,6 +39,11 @@ def transposed(sequence: Sequence) -> Sequence:
     return _with_cameras(sequence, lambda c: _posed(c, c.rotation.T, c.translation))
 
 
+def positions(sequence: Sequence) -> Sequence:
+    """The cameras' positions as t."""
+    return _with_cameras(sequence, lambda c: _posed(c, c.rotation, c.centre))
+
+
 def opengl(sequence: Sequence) -> Sequence:
     """Camera axes with y up and z back."""
     return _with_cameras(sequence, lambda c: _posed(c, FLIP @ c.rotation, FLIP @ c.translation))

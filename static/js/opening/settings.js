@@ -86,6 +86,7 @@ export function roomPart(info, moved) {
 			"world-to-camera",
 			"camera-to-world",
 			"transposed",
+			"position",
 		]),
 		choice("Axes", "axes", wish.axes, info.axes, ["opencv", "opengl"]),
 		info.cameras.some(({ detections }) => detections) && [

@@ -640,10 +640,10 @@ declare namespace Server {
 		/** Axis of the calibration's world that points up. */
 		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
 		/**
-		 * What R and t map: points of the world to the camera, points of the camera to the world, or
-		 * the first with R transposed, as of points in rows.
+		 * What R and t map: points of the world to the camera, points of the camera to the world, the
+		 * first with R transposed, as of points in rows, or with the camera's position as t.
 		 */
-		pose: "world-to-camera" | "camera-to-world" | "transposed" | null;
+		pose: "world-to-camera" | "camera-to-world" | "transposed" | "position" | null;
 		/** Axes of a camera: y down and z ahead, or y up and z back. */
 		axes: "opencv" | "opengl" | null;
 		/**

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import short
-from tests.mistakes import MISTAKES, transposed, y_up
+from tests.mistakes import MISTAKES, positions, transposed, y_up
 from tests.random_rooms import random_room
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
@@ -55,9 +56,15 @@ def test_each_usual_mistake_is_named_with_its_remedy(name: str) -> None:
     assert sum(named) >= len(ROOMS) - 1
 
 
+@pytest.mark.parametrize(
+    ("mistaken", "flag"),
+    [(transposed, "--pose transposed"), (positions, "--pose position")],
+)
 @pytest.mark.parametrize("seed", short(ROOMS, 2))
-def test_rotations_that_are_transposed_are_named(seed: int) -> None:
-    assert warnings(transposed(random_room(seed, steps=150))) == ["--pose transposed"]
+def test_poses_that_are_half_inverted_are_named(
+    seed: int, mistaken: Callable[[Sequence], Sequence], flag: str
+) -> None:
+    assert warnings(mistaken(random_room(seed, steps=150))) == [flag]
 
 
 @pytest.mark.full

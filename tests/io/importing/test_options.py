@@ -272,6 +272,7 @@ def test_a_header_that_the_boxes_contradict_is_asked_about(
         ("world-to-camera", "transposed", "--pose transposed"),
         ("transposed", "transposed", "--pose world-to-camera"),
         ("camera-to-world", "camera-to-world", "--pose world-to-camera"),
+        ("position", "position", "--pose world-to-camera"),
         ("camera-to-world", "transposed", None),
     ],
 )

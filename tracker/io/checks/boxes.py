@@ -46,6 +46,12 @@ from tracker.sequences.sequence import Sequence
 AS_GIVEN = Reading()
 """How a sequence's file is read."""
 
+_POSES = {
+    "camera-to-world": "the poses inverted",
+    "transposed": "R transposed",
+    "position": "the camera's position as t",
+}
+
 # What is measured is of the random rooms of seeds 1500 … 1511, with 200 steps, and of five
 # recordings, all read rightly: halved or doubled, no bound warns of one of them. Each lies far from
 # what is measured, for it is a mistake that is sought and not an error.
@@ -211,8 +217,7 @@ def _mistake(sequence: Sequence, judged: JudgedBoxes) -> Check:
     words: list[str] = []
     remedies = stating_flags(reading, AS_GIVEN, names)
     if reading.direction != "world-to-camera":
-        transposed = reading.direction == "transposed"
-        words.append("R transposed" if transposed else "the poses inverted")
+        words.append(_POSES[reading.direction])
     if reading.axes != "opencv":
         words.append("OpenGL's camera axes (y up, z back)")
     if reading.layout != "ltwh":

@@ -72,11 +72,10 @@ def _pose(camera: RawCamera, reading: Reading) -> Pose:
         raise ValueError(f'camera "{camera.name}" has no pose: expected R and t, or a projection')
     rotation = np.asarray(camera.turns.get(reading.turns, camera.rotation), dtype=float)
     translation = np.asarray(camera.translation, dtype=float).reshape(3)
-    if reading.direction == "camera-to-world":
-        rotation, centre = rotation.T, translation
-    else:
-        rotation = rotation.T if reading.direction == "transposed" else rotation
-        centre = -rotation.T @ translation
+    if reading.direction in ("camera-to-world", "transposed"):
+        rotation = rotation.T
+    places = reading.direction in ("camera-to-world", "position")
+    centre = translation if places else -rotation.T @ translation
     if reading.axes == "opengl":
         rotation = FLIP @ rotation
     return Pose(rotation, centre)

@@ -33,8 +33,8 @@ class CommonImportOptions(BaseModel):
     up: Up | None = None
     """Axis of the calibration's world that points up."""
     pose: Direction | None = None
-    """What R and t map: points of the world to the camera, points of the camera to the world, or
-    the first with R transposed, as of points in rows."""
+    """What R and t map: points of the world to the camera, points of the camera to the world,
+    the first with R transposed, as of points in rows, or with the camera's position as t."""
     axes: Axes | None = None
     """Axes of a camera: y down and z ahead, or y up and z back."""
     turns: Annotated[str, Field(max_length=40)] | None = None

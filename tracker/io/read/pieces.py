@@ -23,9 +23,10 @@ from numpy import ndarray
 from tracker.geometry.calibration import Lens
 
 Unit = Literal["m", "cm", "mm"]
-Direction = Literal["world-to-camera", "camera-to-world", "transposed"]
-"""What R and t map: x_camera = R x_world + t; x_world = R x_camera + t; or the first with R
-transposed, as of points in rows, x_cameraᵀ = x_worldᵀ R + tᵀ, and of files column by column."""
+Direction = Literal["world-to-camera", "camera-to-world", "transposed", "position"]
+"""What R and t map: x_camera = R x_world + t; x_world = R x_camera + t; the first with R
+transposed, as of points in rows, x_cameraᵀ = x_worldᵀ R + tᵀ, and of files column by column; or the
+first with the camera's position as t, x_camera = R (x_world - t), as Human3.6M has it."""
 Axes = Literal["opencv", "opengl"]
 """The axes of a camera: x right, y down, z ahead (OpenCV); or x right, y up, z back (OpenGL)."""
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -91,7 +92,7 @@ class RawCamera:
     rotation: Float[ndarray, "3 3"] | None = None
     translation: Float[ndarray, " 3"] | None = None
     """The translation as in the file, in the convention's unit: t of ``x_camera = R x_world + t``,
-    or the camera's position if the direction is camera-to-world."""
+    or the camera's position if the direction is camera-to-world or position."""
     convention: Convention = Convention()
     turns: Mapping[str, Float[ndarray, "3 3"]] = field(default_factory=lambda: MappingProxyType({}))
     """For a rotation given by angles, or a quaternion of unknown order, all possible rotations by
