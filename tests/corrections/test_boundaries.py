@@ -13,6 +13,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 from numpy import ndarray
+from pydantic import ValidationError
 
 from tests import world
 from tracker.corrections import Correction, CorrectionError, Place
@@ -589,6 +590,8 @@ def test_a_second_in_steps_is_at_least_one(step_time: float, steps: int) -> None
         ({"kind": "here", "places": [at(0, float("nan"))]}, "places"),
         ({"kind": "name", "places": [at(0)], "name": "x" * 81}, "name"),
         ({"kind": "name", "places": [at(0)], "name": "x" * 80}, ""),
+        ({"kind": "hear", "places": [at(0)]}, "kind: Input should be 'same'"),
+        ({"places": [at(0)]}, "kind: Field required"),
     ],
 )  # fmt: skip
 def test_a_correction_is_complete_or_refused(values: dict, wrong: str) -> None:
@@ -597,6 +600,11 @@ def test_a_correction_is_complete_or_refused(values: dict, wrong: str) -> None:
         return
     with pytest.raises(CorrectionError, match=wrong):
         make(**values)
+
+
+def test_what_is_no_table_is_no_correction() -> None:
+    with pytest.raises(ValidationError, match="valid dictionary"):
+        Correction.model_validate(["same"])
 
 
 def test_a_correction_speaks_of_its_places() -> None:

@@ -251,21 +251,42 @@ def test_cameras_that_differ_in_their_delay_do_not_count_otherwise() -> None:
     assert (found.status, found.remedies) == ("good", ())
 
 
-def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> None:
+def agreed_on(height: float, foot: float, count: int = 200) -> Consensus:
+    """A consensus on boxes of a height, their feet at a height above z = 0, metres."""
     rng = np.random.default_rng(3)
-    feet = np.column_stack([rng.uniform(-3.0, 3.0, (200, 2)), np.full(200, 0.4)])
-    rises = np.tile([0.0, 0.0, 1.2], (200, 1))
-    none = np.zeros(200, dtype=int)
-    agreed = Consensus(
-        rises[0], 1.0, {(0, 1): 1.0}, 200, 200, none, feet, rises, np.zeros(200), np.ones(200),
-        np.tile([0, 1], (200, 1)),
+    feet = np.column_stack([rng.uniform(-3.0, 3.0, (count, 2)), np.full(count, foot)])
+    rises = np.tile([0.0, 0.0, height], (count, 1))
+    none = np.zeros(count, dtype=int)
+    return Consensus(
+        np.array([0.0, 0.0, height]), 1.0, {(0, 1): 1.0}, count, count, none, feet, rises,
+        np.zeros(count), np.ones(count), np.tile([0, 1], (count, 1)),
     )  # fmt: skip
-    found = suggest([], agreed)
+
+
+def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> None:
+    found = suggest([], agreed_on(1.2, 0.4))
     assert found is not None
     assert found.half_extents[2] == pytest.approx(0.6)
     # middles at 1.0
     assert found.floor == pytest.approx(-0.2)
     assert (found.minimum[2], found.maximum[2]) == pytest.approx((-0.2, 2.2), abs=0.1001)
+
+
+@pytest.mark.parametrize(
+    ("height", "half_extents"),
+    [
+        (0.3, (0.105, 0.105, 0.15)),  # a head
+        (0.5, (0.125, 0.125, 0.25)),  # with shoulders
+        (0.7, (0.175, 0.175, 0.35)),
+        (1.7, (0.3, 0.3, 0.85)),  # a standing person
+    ],
+)
+def test_heads_are_less_slender_than_people(
+    height: float, half_extents: tuple[float, float, float]
+) -> None:
+    found = suggest([], agreed_on(height, 1.0))
+    assert found is not None
+    assert found.half_extents == pytest.approx(half_extents)
 
 
 def test_flags_state_what_differs_and_the_form_of_boxes_once() -> None:
