@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tests import world
 from tests.random_rooms import random_room
-from tracker.geometry.consistency import consensus
+from tracker.geometry.consistency import consensus, sliding
 from tracker.geometry.consistency.likelihood import (
     Evidence,
     Moments,
@@ -32,7 +32,7 @@ from tracker.geometry.consistency.observed import (
 )
 from tracker.geometry.consistency.odds import log_odds
 from tracker.geometry.consistency.sliding import link_boxes
-from tracker.geometry.consistency.standing import turn_of
+from tracker.geometry.consistency.standing import ends, turn_of
 from tracker.geometry.consistency.suggestion import consensus_of_cameras
 from tracker.sequences.sequence import Sequence
 
@@ -153,6 +153,81 @@ def test_a_box_is_whole_where_it_has_a_size_and_ends_before_the_edge(
     camera = world.ring(4)[0]
     rays = rays_of(np.zeros(1), np.array([box]), replace(camera, image_size=(640, 480)))
     assert rays.whole.tolist() == [whole]
+
+
+@pytest.mark.parametrize(
+    ("up", "size", "length"),
+    [
+        ((0.0, -1.0), (40.0, 100.0), 100.0),
+        ((1.0, 0.0), (100.0, 40.0), 100.0),
+        # a diagonal one has an unknown breadth: T = 0.4 L, and w² = h² = (L² + T²) / 2
+        ((0.5**0.5, -(0.5**0.5)), (100.0, 100.0), 100.0 * (2.0 / 1.16) ** 0.5),
+    ],
+)
+def test_how_long_a_person_is_in_a_rolled_picture(
+    up: tuple[float, float], size: tuple[float, float], length: float
+) -> None:
+    focal = 2000.0
+    camera = world.look_at("level", (0.0, -4.0, 1.0), (0.0, 0.0, 1.0), focal=focal)
+    box = np.array([[639.5 - size[0] / 2.0, 399.5 - size[1] / 2.0, *size]])
+    for lens in (
+        camera,
+        replace(camera, translation=np.zeros(3)),  # the pose has no effect
+        replace(camera, rotation=np.eye(3)),
+    ):
+        heads, feet, good = ends(box, lens, np.array([*up, 0.0]))
+        assert good.all()
+        across = focal * (heads[0] / heads[0, 2] - feet[0] / feet[0, 2])[:2]
+        np.testing.assert_allclose(across, length * np.array(up), atol=0.5)
+
+
+def test_a_box_seen_from_straight_above_shows_neither_head_nor_foot() -> None:
+    camera = world.look_at("above", (0.0, 0.0, 4.0), (0.0, 0.01, 0.0))
+    middle = np.array(camera.image_size) / 2.0 - 40.0
+    boxes = np.array([[*middle, 80.0, 80.0], [100.0, 100.0, 80.0, 80.0]])
+    assert upright_rays(np.zeros(2), boxes, camera).whole.tolist() == [False, True]
+    assert rays_of(np.zeros(2), boxes, camera).whole.all()
+
+
+@pytest.mark.parametrize(
+    ("target", "change", "expected"),
+    [
+        ((0.0, -4.0, 2.0), "", True),
+        ((0.0, -4.0, 10.25), "", False),  # the foot is below the picture
+        ((0.0, -4.0, -9.2), "", False),  # the head is above it
+        ((0.0, -4.0, 2.0), "clipped", False),
+        ((0.0, -4.0, 2.0), "head below foot", False),
+        ((0.0, -4.0, 2.0), "both up", False),
+        ((0.0, -4.0, 2.0), "both down", False),
+    ],
+)
+def test_a_box_is_expected_in_another_picture_where_head_and_foot_lie_ahead_and_in_it(
+    target: tuple[float, float, float], change: str, expected: bool
+) -> None:
+    """The other camera is far aside, and has what is before and behind the first one."""
+    place = np.array([[0.0, 0.0, 0.85]])
+    camera = world.look_at("one", (0.0, -4.0, 2.0), (0.0, 0.0, 1.0))
+    other = world.look_at("other", (15.0, -4.0, 2.0), target)
+    x, y, half_width, half_height = world.upright(camera, place)[0]
+    box = np.array([[x - half_width, y - half_height, 2.0 * half_width, 2.0 * half_height]])
+    rays = upright_rays(np.zeros(1, dtype=int), box, camera)
+    heads, feet, whole = rays.heads, rays.feet, rays.whole
+    if change == "head below foot":
+        heads, feet = feet, heads
+    elif change == "clipped":
+        whole = ~whole
+    elif change:  # to either side, at the same height
+        up = 0.3 if change == "both up" else -0.3
+        heads, feet = (
+            np.array([[side, 0.9, up]]) / np.linalg.norm([side, 0.9, up]) @ camera.rotation.T
+            for side in (0.2, -0.2)
+        )
+    linked = link_boxes(camera, replace(rays, heads=heads, feet=feet, whole=whole), box, 1)
+    found, _ = sliding._predicted_boxes(other, linked, np.zeros(1, dtype=int), 1.7)
+    assert np.isfinite(found).all() == expected
+    if expected:
+        there = other.project(place + np.array([[0.0, 0.0, 0.85], [0.0, 0.0, -0.85]]))[0]
+        np.testing.assert_allclose(found[0], there.ravel(), atol=5.0)
 
 
 def test_a_box_is_compared_where_it_is_whole_ahead_and_shows_two_directions() -> None:
