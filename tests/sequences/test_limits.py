@@ -71,8 +71,8 @@ READERS: dict[str, Callable[[Any], object]] = {
 LIMITS: dict[str, tuple[list[Any], list[Any]]] = {
     "rate": ([0.0011, 1000.0, 25], [0.001, 1000.1, 0.0, True, "25", float("nan"), 10**400]),
     "text": (["a", "x" * 1000, " a  b "], ["", "  ", "x" * 1001, 3, "a\0b"]),
-    "count": ([0, 10_000_000], [-1, 10_000_001, 0.0, True, False]),
-    "from 2 to 4": ([2, 3, 4], [1, 5, 3.0]),
+    "count": ([0, 10_000_000], [-1, 10_000_001, 0.0, True, False, "3"]),
+    "from 2 to 4": ([2, 3, 4], [1, 5, 3.0, "3"]),
     "vector": ([1e6, -1e6, 0], [NEXT_TO_A_MILLION, -NEXT_TO_A_MILLION, True, float("inf")]),
     "positive": ([1e-4, 1e6], [0.0, np.nextafter(1e-4, 0.0), -1.0, NEXT_TO_A_MILLION]),
     "numbers": ([1e6, -1e6], [NEXT_TO_A_MILLION, "1"]),
