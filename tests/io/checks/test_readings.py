@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from tests import world
 from tests.conftest import short
 from tests.mistakes import MISTAKES, transposed, y_up
 from tests.random_rooms import random_room
@@ -225,6 +226,14 @@ def test_without_boxes_the_room_is_where_views_overlap(cameras: int) -> None:
     assert (found.minimum[:2] < middle).all()
     assert (found.maximum[:2] > middle).all()
     assert found.people == 0
+
+
+def test_without_boxes_no_room_is_behind_a_camera() -> None:
+    camera = world.look_at("one", (0.0, 0.0, 3.0), (4.0, 0.0, 1.0))
+    found = suggest([camera], None)
+    assert found is not None
+    assert found.minimum[0] > 0.0
+    assert found.maximum[0] > 10.0
 
 
 @pytest.mark.parametrize(("pairs", "people"), [(19, 0), (20, 20)])
