@@ -282,6 +282,24 @@ def test_a_header_may_claim_a_rate_above_0_and_below_1000(
     assert video._rate(np.array(times), claimed) == rate
 
 
+@pytest.mark.parametrize(
+    ("decoded", "in_order"),
+    [
+        ([0], True),
+        ([0, 20, 30], True),
+        ([10, 20], False),  # the first frame is missing
+        ([0, 20, 10], False),
+        ([0, 10, 10], False),
+        ([0, 15], False),  # no frame has this time
+        ([0, 40], False),
+    ],
+)
+def test_pictures_are_in_order_from_frame_0_on_with_ascending_times_of_frames(
+    decoded: list[int], in_order: bool
+) -> None:
+    assert video._in_order(np.array([0, 10, 20, 30]), np.array(decoded)) is in_order
+
+
 @pytest.mark.parametrize(("limit", "most"), [("LARGEST_COUNT", 5), ("MOST_PIXELS", 64 * 48)])
 def test_a_video_at_a_limit_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, most: int
