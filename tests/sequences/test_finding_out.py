@@ -26,7 +26,7 @@ from tracker.sequences.pictures.video import VideoError, VideoIndex, index_video
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, OpenedFiles
 from tracker.sequences.views import Source, read_views
-from tracker.sequences.writing.teaching import Values, carried_over, changes
+from tracker.sequences.writing.teaching import Values, carried_over, changes, paired_entrances
 
 CAMERA = world.ring(1, image_size=(64, 48))[0]
 
@@ -395,6 +395,12 @@ def test_of_what_was_taught_on_another_rendering_that_is_carried_over_which_fits
     assert [one["frame"] for one in after["template"]] == [3, 7, 8]
     assert after["room"]["max"] == [2.0, 1.0, 2.0]
     assert [one["frame"] for one in now["template"]] == [3]
+
+
+def test_entrances_are_paired_in_their_new_order() -> None:
+    before, after = [{"x": 1}, {"x": 2}], [{"x": 3}, {"x": 1}, {"x": 4}]
+    assert paired_entrances(before, after) == [(1, 0), (0, 1), (None, 2)]
+    assert paired_entrances(before, after[1:2]) == [(0, 0), (1, None)]
 
 
 def test_changes_of_entrances_and_templates_are_paired_by_what_stays() -> None:
