@@ -64,6 +64,7 @@ TESTED_BY = {
     "kernels/lens.py": ("kernels", "geometry"),
     "kernels/consistency.py": ("kernels", "geometry"),
     "kernels": ("kernels", "filters"),
+    "sequences/detectors.py": ("single_view/test_detector_fetching.py",),
     "sequences": ("sequences", "bad_input/test_table.py"),
     "geometry/consistency": ("geometry", "io/checks"),
     "steps": ("runs/test_steps.py", "runs/test_stage_files.py"),

@@ -13,6 +13,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 from numpy import ndarray
+from pydantic import ValidationError
 
 from tests import world
 from tracker.corrections import Correction, CorrectionError, Place
@@ -193,6 +194,13 @@ def test_two_that_cannot_both_be_true_are_refused(told: list[tuple], refused: bo
     else:
         refuse_contradiction(before, new)
     refuse_contradiction([*before[:-1], new], new)  # itself is no other one
+
+
+def test_a_contradiction_names_the_correction_of_these_places() -> None:
+    tie = make(kind="same", places=[at(1), at(5)])
+    others = make(kind="same", places=[at(1, 5.0), at(7, 5.0)])  # at the same step, later said
+    with pytest.raises(CorrectionError, match=f'contradicts "{tie.words}'):
+        refuse_contradiction([tie, others], make(kind="different", places=[at(1), at(5)]))
 
 
 @pytest.mark.parametrize(("reach", "apart", "refused"), [(0.1, 0.1, True), (0.1, 0.11, False)])
@@ -589,6 +597,11 @@ def test_a_second_in_steps_is_at_least_one(step_time: float, steps: int) -> None
         ({"kind": "here", "places": [at(0, float("nan"))]}, "places"),
         ({"kind": "name", "places": [at(0)], "name": "x" * 81}, "name"),
         ({"kind": "name", "places": [at(0)], "name": "x" * 80}, ""),
+        ({"kind": "hear", "places": [at(0)]}, "kind: Input should be 'same'"),
+        ({"places": [at(0)]}, "kind: Field required$"),
+        ({"kind": "here", "places": [3]}, "^places.0: .*, found 3$"),
+        ({"kind": "here", "places": [[]]}, "^places.0"),
+        ({"kind": "here", "places": [{"step": 3}]}, "^places.0.x: Field required$"),
     ],
 )  # fmt: skip
 def test_a_correction_is_complete_or_refused(values: dict, wrong: str) -> None:
@@ -597,6 +610,11 @@ def test_a_correction_is_complete_or_refused(values: dict, wrong: str) -> None:
         return
     with pytest.raises(CorrectionError, match=wrong):
         make(**values)
+
+
+def test_what_is_no_table_is_no_correction() -> None:
+    with pytest.raises(ValidationError, match="valid dictionary"):
+        Correction.model_validate(["same"])
 
 
 def test_a_correction_speaks_of_its_places() -> None:

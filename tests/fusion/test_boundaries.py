@@ -130,6 +130,11 @@ def test_a_box_that_somebody_made_as_likely_as_not_begins_nobody(
 ) -> None:
     found = births().propose(evidence(exact([PLACE]), unexplained=unexplained))
     assert (0 if found is None else len(found.existences)) == count
+    told = evidence(exact([PLACE]))
+    told.unexplained[3] = unexplained  # and is no other box of a newcomer
+    found = births().propose(told)
+    assert found is not None
+    assert found.sources[:, 0].tolist() == [0, 0, 0, count - 1]
 
 
 def test_a_box_belongs_to_a_place_by_the_uncertainty_of_both() -> None:

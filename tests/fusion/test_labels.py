@@ -97,16 +97,20 @@ NO_TRACKS = np.zeros(0, dtype=np.int64)
 
 
 def step(
-    names: IdentityBeliefs, labels: list[int], looks: list[list[float]], seconds: float = 0.2
+    names: IdentityBeliefs,
+    labels: list[int],
+    looks: list[list[float]],
+    seconds: float = 0.2,
+    weight: float = 0.99,
 ) -> tuple[dict[int, int], IdentityBeliefs]:
-    """One camera sees one box of each sure track, with these likenesses."""
+    """One camera sees one box of each track, with these likenesses."""
     count = len(labels)
     boxes = np.ones((count, 4))
     view = ViewResult.of_boxes(boxes, np.ones(count), boxes)
     people = len(looks[0]) if looks else 2
     view = replace(view, likenesses=np.array(looks).reshape(count, people))
     posterior = GaussianMixture(
-        np.full(count, 0.99), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)),
+        np.full(count, weight), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)),
         np.array(labels, dtype=np.int64),
     )  # fmt: skip
     own = np.arange(count, dtype=np.int32)
@@ -140,16 +144,26 @@ def test_the_boxes_of_an_interval_count_as_one(interval: float) -> None:
 
 
 def watched(
-    names: IdentityBeliefs, labels: list[int], looks: list[list[float]], steps: int
+    names: IdentityBeliefs,
+    labels: list[int],
+    looks: list[list[float]],
+    steps: int,
+    weight: float = 0.99,
 ) -> IdentityBeliefs:
     """Many steps in which no label changes."""
     for _ in range(steps):
-        renamed, names = step(names, labels, looks)
+        renamed, names = step(names, labels, looks, weight=weight)
         assert renamed == {}
     return names
 
 
 FIRST, SECOND, EITHER = [0.95, 0.05], [0.05, 0.95], [0.5, 0.5]
+
+
+@pytest.mark.parametrize(("weight", "owners"), [(0.5, [-1, -1]), (0.5 + 1e-9, [1, 2])])
+def test_a_track_is_named_once_it_is_likelier_than_not(weight: float, owners: list[int]) -> None:
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 30, weight)
+    assert names.owners.tolist() == owners
 
 
 def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() -> None:

@@ -660,5 +660,5 @@ def test_however_little_clutter_there_is_a_box_is_shared_by_its_odds(clutter: fl
 
 
 def test_sure_people_are_merged_with_nobody_else() -> None:
-    people = mixture([0.4, 0.4, 0.3, 0.9], [[0.0, 0.0]] * 4, [1, 1, 2, 3])
-    assert_array_equal(sequential_phd.merging_owners(people), [1, 1, -1, 3])
+    people = mixture([0.4, 0.4, 0.3, 0.9, 0.25, 0.25], [[0.0, 0.0]] * 6, [1, 1, 2, 3, 4, 4])
+    assert_array_equal(sequential_phd.merging_owners(people), [1, 1, -1, 3, -1, -1])

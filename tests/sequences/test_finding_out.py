@@ -26,7 +26,7 @@ from tracker.sequences.pictures.video import VideoError, VideoIndex, index_video
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, OpenedFiles
 from tracker.sequences.views import Source, read_views
-from tracker.sequences.writing.teaching import Values, carried_over, changes
+from tracker.sequences.writing.teaching import Values, carried_over, changes, paired_entrances
 
 CAMERA = world.ring(1, image_size=(64, 48))[0]
 
@@ -282,6 +282,24 @@ def test_a_header_may_claim_a_rate_above_0_and_below_1000(
     assert video._rate(np.array(times), claimed) == rate
 
 
+@pytest.mark.parametrize(
+    ("decoded", "in_order"),
+    [
+        ([0], True),
+        ([0, 20, 30], True),
+        ([10, 20], False),  # the first frame is missing
+        ([0, 20, 10], False),
+        ([0, 10, 10], False),
+        ([0, 15], False),  # no frame has this time
+        ([0, 40], False),
+    ],
+)
+def test_pictures_are_in_order_from_frame_0_on_with_ascending_times_of_frames(
+    decoded: list[int], in_order: bool
+) -> None:
+    assert video._in_order(np.array([0, 10, 20, 30]), np.array(decoded)) is in_order
+
+
 @pytest.mark.parametrize(("limit", "most"), [("LARGEST_COUNT", 5), ("MOST_PIXELS", 64 * 48)])
 def test_a_video_at_a_limit_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, most: int
@@ -377,6 +395,12 @@ def test_of_what_was_taught_on_another_rendering_that_is_carried_over_which_fits
     assert [one["frame"] for one in after["template"]] == [3, 7, 8]
     assert after["room"]["max"] == [2.0, 1.0, 2.0]
     assert [one["frame"] for one in now["template"]] == [3]
+
+
+def test_entrances_are_paired_in_their_new_order() -> None:
+    before, after = [{"x": 1}, {"x": 2}], [{"x": 3}, {"x": 1}, {"x": 4}]
+    assert paired_entrances(before, after) == [(1, 0), (0, 1), (None, 2)]
+    assert paired_entrances(before, after[1:2]) == [(0, 0), (1, None)]
 
 
 def test_changes_of_entrances_and_templates_are_paired_by_what_stays() -> None:

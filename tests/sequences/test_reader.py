@@ -79,6 +79,18 @@ def test_everything_in_the_file_is_read(source: Path) -> None:
     assert sequence.warnings == ()
 
 
+@pytest.mark.parametrize("missing", ["room", "target"])
+def test_a_room_or_a_target_alone_that_is_not_stated_is_found(folder: Path, missing: str) -> None:
+    text = (folder / "sequence.toml").read_text(encoding="utf-8")
+    begin = text.index(f"[{missing}]")
+    edit(folder, text[begin : text.index("\n\n", begin)], "")
+    sequence = read_sequence(folder)
+    assert [said.partition(" is")[0] for said in sequence.warnings][:1] == [f"[{missing}]"]
+    stated = (sequence.room.maximum.tolist() == [1.5, 1.5, 2.0],
+              sequence.target_half_extents.tolist() == [0.3, 0.3, 0.84])  # fmt: skip
+    assert stated == (missing == "target", missing == "room")
+
+
 def test_the_sequence_file_itself_may_be_named(source: Path) -> None:
     assert read_sequence(source / "sequence.toml").folder == source.resolve()
     assert read_sequence(str(source)).folder == source.resolve()

@@ -144,11 +144,17 @@ def test_a_damaged_network_is_not_used_and_fetched_again(
     file.write_bytes(damage(file.read_bytes()))
     (listed,) = fetched_detectors()
     assert listed.damage.startswith("is damaged: ")
+    assert "None" not in listed.damage
+    with pytest.raises(ValueError, match=r"^the detector .* is damaged: "):
+        _ = listed.file
     assert usable_detector()[0] is None
     (words,) = (w for w in open_sequence("room24-2p").warnings if "detection network" in w)
     assert words.startswith(str(found.folder))
     assert words.count(" is damaged: ") == 1
     assert words.endswith("fetch it again by `multiview-phd detector get`")
+    file.unlink()
+    (listed,) = fetched_detectors()
+    assert listed.damage == "is damaged: its files cannot be read (No such file or directory)"
     assert fetch(source_of(content)).damage == ""
     assert usable_detector()[0] is not None
     assert not open_sequence("room24-2p").warnings

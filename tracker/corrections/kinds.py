@@ -277,7 +277,7 @@ def sentence_of(error: ValidationError) -> str:
     place = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
     given = first.get("input")
-    found = f", found {given!r}" if place and not isinstance(given, dict) else ""
+    found = "" if isinstance(given, dict) else f", found {given!r}"
     return f"{place}: {message}{found}" if place else message
 
 

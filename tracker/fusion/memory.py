@@ -78,7 +78,7 @@ def recall(
         return labels, memory
     representatives = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
     missing = _predict_lost(memory, labels[representatives], model, first_label)
-    if missing.lost.size and len(representatives):
+    if missing.lost.size:
         labels, back = _return_labels(
             missing, mixture.take(representatives), labels, model.recovery_gate
         )

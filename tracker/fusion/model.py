@@ -128,7 +128,7 @@ class FusionModel:
             mixture: J components.
             occluders: Weight of each component that may occlude others, else 0.
         """
-        hiding = np.flatnonzero(occluders > CONFIRMED)
+        hiding = np.flatnonzero(occluders)
         return target_model.visibility(
             self.detection_probabilities(index, expected, mixture),
             expected,

@@ -133,7 +133,5 @@ def sum_associations(
         boxes: Index of the box of each pair, in its camera.
         probabilities: Association probability of each pair, 0 … 1.
     """
-    if not len(labels) or not len(cameras):
-        return Associations.none()
     found = sum_pairs(labels, cameras, pair_labels, boxes, probabilities)
     return Associations(found.cameras, found.components, found.boxes, found.probabilities)

@@ -128,10 +128,9 @@ def appearance_ratios(
         One row a track and one column a box, 1 where the appearance is not known; no rows
         (k = 0) where no track has a belief, else k = n.
     """
-    count = sum(len(view.boxes) for view in views)
+    if not len(identities.labels):
+        return np.ones((0, sum(len(view.boxes) for view in views)))
     people = identities.log_beliefs.shape[1]
-    if not people or not len(identities.labels) or not count:
-        return np.ones((0, count))
     log_beliefs = _known(identities, labels, people)
     beliefs = np.exp(log_beliefs - log_beliefs.max(axis=1, keepdims=True))
     beliefs /= beliefs.sum(axis=1, keepdims=True)

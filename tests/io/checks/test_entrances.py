@@ -56,6 +56,9 @@ def test_a_track_that_is_lost_and_found_again_came_through_no_door() -> None:
     assert found(*lost, (200, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)], "both are there"
     assert found(*lost, (230, 399, (0.3, 0.0), (2.0, 0.0))) == [], "a second and a half"
     assert found(*lost, (231, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)]
+    farther = (*lost[:2], (0, 200, (-2.0, 0.0), (1.0, 0.0)))
+    assert found(*farther, (220, 399, (2.5, 0.0), (2.0, 0.0))) == [], "a metre and a half"
+    assert found(*farther, (220, 399, (2.6, 0.0), (2.0, 0.0))) == [(2.6, 0.0, 1)]
     # much later it is somebody else, who appears where one vanished: a door in the middle
     assert found(*lost, (300, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)]
 
@@ -63,8 +66,18 @@ def test_a_track_that_is_lost_and_found_again_came_through_no_door() -> None:
 def test_one_beginning_alone_counts_at_the_edge_only() -> None:
     inside = (100, 399, (0.0, 0.0), (1.0, 0.0))
     assert found(THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), inside) == []
-    edge = (100, 399, (3.2, 0.0), (1.0, 0.0))
-    assert found(THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), edge) == [(3.2, 0.0, 1)]
+    for x in (3.2, 2.25):
+        edge = (100, 399, (x, 0.0), (1.0, 0.0))
+        doors = found(THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), edge)
+        assert doors == [(round(x, 1), 0.0, 1)]
+
+
+@pytest.mark.parametrize(("apart", "tracks"), [(1.0, [2]), (1.25, [1, 1])])
+def test_a_door_is_as_wide_as_people_come_in_within_a_metre(
+    apart: float, tracks: list[int]
+) -> None:
+    pieces = [(40, 399, (3.0, y), (0.0, 0.0)) for y in (0.0, apart)]
+    assert [count for _, _, count in found(*pieces)] == tracks
 
 
 @pytest.mark.parametrize(
@@ -104,3 +117,4 @@ def test_what_is_known_is_not_suggested_again() -> None:
     assert len(doors) == 2
     (left,) = not_yet_there(doors, [np.array([2.5, 0.3, 1.0])])
     assert left.position[0] == -3.0
+    assert not_yet_there(doors, [np.array([2.0, 0.0, 1.0])]) == [left], "a metre away is the same"

@@ -40,6 +40,12 @@ def test_of_people_who_walk(fps: float) -> None:
     assert WALKING / found == pytest.approx(fps, rel=0.25)
 
 
+@pytest.mark.parametrize(("steps", "enough"), [(11, True), (10, False)])
+def test_thirty_displacements_are_enough(steps: int, enough: bool) -> None:
+    """Three people in so many steps have three less from one step to the next."""
+    assert (pace_of(walkers(1.0, WALKING, steps)) is not None) is enough
+
+
 def test_nobody_walks() -> None:
     assert pace_of(walkers(4.0, 0.0)) is None
     assert pace(cameras(), [rays_of(np.zeros(0), np.zeros((0, 4)), c) for c in cameras()]) is None

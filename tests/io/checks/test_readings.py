@@ -9,6 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from tests import world
 from tests.conftest import short
 from tests.mistakes import MISTAKES, positions, transposed, y_up
 from tests.random_rooms import random_room
@@ -223,14 +224,30 @@ def test_room_and_people_are_suggested(seed: int) -> None:
     assert (found.maximum[:2] - found.minimum[:2] <= high[:2] - low[:2] + 3.0).all()
 
 
-def test_without_boxes_the_room_is_where_views_overlap() -> None:
+@pytest.mark.parametrize("cameras", [1, 2, 3])
+def test_without_boxes_the_room_is_where_views_overlap(cameras: int) -> None:
     sequence = random_room(4, cameras=3)
-    found = suggest(sequence.cameras, None)
+    found = suggest(sequence.cameras[:cameras], None)
     assert found is not None
     middle = (sequence.room.minimum + sequence.room.maximum)[:2] / 2.0
     assert (found.minimum[:2] < middle).all()
     assert (found.maximum[:2] > middle).all()
     assert found.people == 0
+
+
+def test_without_boxes_no_room_is_behind_a_camera() -> None:
+    camera = world.look_at("one", (0.0, 0.0, 3.0), (4.0, 0.0, 1.0))
+    found = suggest([camera], None)
+    assert found is not None
+    assert found.minimum[0] > 0.0
+    assert found.maximum[0] > 10.0
+
+
+@pytest.mark.parametrize(("pairs", "people"), [(19, 0), (20, 20)])
+def test_twenty_pairs_of_boxes_are_enough_for_a_room(pairs: int, people: int) -> None:
+    found = suggest(random_room(4, cameras=3).cameras, agreed_on(1.7, 0.0, pairs))
+    assert found is not None
+    assert found.people == people
 
 
 def test_boxes_a_step_before_the_truth_are_counted_from_0() -> None:
@@ -258,21 +275,55 @@ def test_cameras_that_differ_in_their_delay_do_not_count_otherwise() -> None:
     assert (found.status, found.remedies) == ("good", ())
 
 
-def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> None:
+def agreed_on(height: float, foot: float, count: int = 200) -> Consensus:
+    """A consensus on boxes of a height, their feet at a height above z = 0, metres."""
     rng = np.random.default_rng(3)
-    feet = np.column_stack([rng.uniform(-3.0, 3.0, (200, 2)), np.full(200, 0.4)])
-    rises = np.tile([0.0, 0.0, 1.2], (200, 1))
-    none = np.zeros(200, dtype=int)
-    agreed = Consensus(
-        rises[0], 1.0, {(0, 1): 1.0}, 200, 200, none, feet, rises, np.zeros(200), np.ones(200),
-        np.tile([0, 1], (200, 1)),
+    feet = np.column_stack([rng.uniform(-3.0, 3.0, (count, 2)), np.full(count, foot)])
+    rises = np.tile([0.0, 0.0, height], (count, 1))
+    none = np.zeros(count, dtype=int)
+    return Consensus(
+        np.array([0.0, 0.0, height]), 1.0, {(0, 1): 1.0}, count, count, none, feet, rises,
+        np.zeros(count), np.ones(count), np.tile([0, 1], (count, 1)),
     )  # fmt: skip
-    found = suggest([], agreed)
+
+
+@pytest.mark.parametrize(
+    ("height", "foot", "bottom", "top"),
+    [
+        (1.2, 0.4, -0.2, 2.2),  # a whole size below and above their middles at 1.0
+        (1.0, 0.2, -0.3, 1.7),
+        (1.0, 0.19, 0.0, 1.69),  # they sit on the floor that the calibration has
+    ],
+)
+def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them(
+    height: float, foot: float, bottom: float, top: float
+) -> None:
+    found = suggest([], agreed_on(height, foot))
     assert found is not None
-    assert found.half_extents[2] == pytest.approx(0.6)
-    # middles at 1.0
-    assert found.floor == pytest.approx(-0.2)
-    assert (found.minimum[2], found.maximum[2]) == pytest.approx((-0.2, 2.2), abs=0.1001)
+    assert found.half_extents[2] == pytest.approx(height / 2.0)
+    assert found.floor == pytest.approx(bottom)
+    assert (found.minimum[2], found.maximum[2]) == pytest.approx((bottom, top), abs=0.1001)
+
+
+@pytest.mark.parametrize(
+    ("height", "half_extents"),
+    [
+        (0.3, (0.105, 0.105, 0.15)),  # a head
+        (0.5, (0.125, 0.125, 0.25)),  # with shoulders
+        (0.7, (0.175, 0.175, 0.35)),
+        (1.44, (0.36, 0.36, 0.72)),  # a seated person
+        (1.45, (0.286765, 0.286765, 0.8125)),  # a standing one, partly as tall as most are
+        (1.7, (0.3, 0.3, 0.85)),
+        (2.3, (0.331765, 0.331765, 0.94)),
+        (2.32, (0.58, 0.58, 1.16)),
+    ],
+)
+def test_people_have_the_size_that_their_height_shows(
+    height: float, half_extents: tuple[float, float, float]
+) -> None:
+    found = suggest([], agreed_on(height, 1.0))
+    assert found is not None
+    assert found.half_extents == pytest.approx(half_extents, abs=0.0006)
 
 
 def test_flags_state_what_differs_and_the_form_of_boxes_once() -> None:

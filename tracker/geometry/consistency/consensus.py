@@ -193,7 +193,7 @@ def consensus(
         feet.append(met.feet[kept])
         all_rises.append(met.rises[kept])
         gaps.append(met.gaps[kept])
-        away = ((met.rises[kept] - rise) ** 2).sum(axis=1) / (SPREAD**2 * float(rise @ rise) or 1.0)
+        away = ((met.rises[kept] - rise) ** 2).sum(axis=1) / (SPREAD**2 * float(rise @ rise))
         fits.append((1.0 - (met.gaps[kept] / LARGEST_GAP) ** 2) * (1.0 - away))
         cameras += [key] * len(kept)
     possible = sum(own.most for own in pairs.values())

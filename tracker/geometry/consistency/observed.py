@@ -159,7 +159,7 @@ def rays_of(
     else:
         heads, feet, visible = ends(boxes, lens, up)
         whole &= visible
-    whole &= np.isfinite(heads).all(axis=1) & np.isfinite(feet).all(axis=1)
+    whole &= np.isfinite(heads + feet).all(axis=1)
     return Rays(np.asarray(frames)[order], heads, feet, whole)
 
 

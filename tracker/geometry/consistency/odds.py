@@ -37,7 +37,7 @@ def log_odds(one: Float[ndarray, " M"], other: Float[ndarray, " M"]) -> float:
     difference = np.asarray(one - other, dtype=float)
     total = float(difference.sum())
     blocks = min(BLOCKS, len(difference))
-    if blocks < 3 or total == 0.0:
+    if blocks < 3:
         return 0.0
     edges = np.linspace(0, len(difference), blocks + 1).astype(int)
     sums = np.add.reduceat(difference, edges[:-1])

@@ -75,9 +75,7 @@ def ends(
     Returns:
         Directions to heads and to feet, and whether the vertical is visible in the image there.
     """
-    own = lens
-    if lens.translation.any() or not np.array_equal(lens.rotation, np.eye(3)):
-        own = replace(lens, rotation=np.eye(3), translation=np.zeros(3))
+    own = replace(lens, rotation=np.eye(3), translation=np.zeros(3))
     middle = boxes[:, :2] + boxes[:, 2:] / 2.0
     along, good = _along(own, own.back_project(np.nan_to_num(middle)), up)
     parts = along**2  # d_x², d_y²
