@@ -301,6 +301,8 @@ def mended(wish: ImportWish, remedies: Sequence[Remedy]) -> dict[str, Any]:
             changes["accept_best"] = True
         elif flag == "first-index":
             changes["first_index"] = int(value)
+        elif flag == "as-named":
+            changes |= {"as_named": True, "swap": ()}
         elif flag == "swap":
             first, _, second = value.partition("=")
             changes["swap"] = (

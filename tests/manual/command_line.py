@@ -12,9 +12,9 @@ from tests.manual.places import ROOT
 INTRODUCTION = """# Command line
 
 The output of `--help` for every command. Exit status 0 means success, 1 a failure, which is
-reported in one line, 2 wrong usage, and 130 an end by Ctrl-C. With `import`, 3 means that the files
-allow several interpretations, and 4 that no interpretation explains the boxes: in both cases
-nothing is written, and the output names the flags that decide.
+reported in one line, 2 wrong usage, and 130 an end by Ctrl-C (0 of `serve`, which ends so). With
+`import`, 3 means that the files allow several interpretations, and 4 that no interpretation
+explains the boxes: in both cases nothing is written, and the output names the flags that decide.
 
 ```sh
 multiview-phd serve [SEQUENCE] [--data DIR]           # the workbench; without SEQUENCE: room44-3p

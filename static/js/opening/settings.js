@@ -255,7 +255,12 @@ const check = (info, { status, name, sentence, remedy, mend, cameras }) =>
 /** @param {Server.ImportedCheck["status"]} status @param {string} name @param {string} words @param {...Child} more */
 function line(status, name, words, ...more) {
 	const [sign, kind] = SIGNS[status];
-	return h("div.chk", icon(`i-${sign}`, kind), h("p", h("b", capital(name)), " ", words), ...more);
+	return h(
+		"div.chk",
+		icon(`i-${sign}`, kind),
+		h("p", h("b", capital(name)), " ", words),
+		h("div.answers", ...more),
+	);
 }
 
 /** @param {Server.ImportedPair} pair @param {string} [sign] */

@@ -7,8 +7,17 @@ from pathlib import Path
 import pytest
 
 from app.state import importing
-from app.state.importing import Announced, Desk, Upload, UploadError, safe_path
+from app.state.importing import (
+    Announced,
+    Desk,
+    ImportWish,
+    Upload,
+    UploadError,
+    mended,
+    safe_path,
+)
 from app.state.workbench import Workbench
+from tracker.sequences.finding import Remedy
 
 
 @pytest.mark.parametrize(
@@ -96,3 +105,8 @@ def test_the_oldest_import_makes_room(tmp_path: Path) -> None:
     assert [desk.draft(draft.key) is not None for draft in drafts] == [False] * 2 + [True] * 4
     desk.close()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_calibrations_as_named_are_exchanged_no_longer() -> None:
+    wish = ImportWish(swap=(("cam1", "cam2"),))
+    assert mended(wish, [Remedy("--as-named", "")]) == {"as_named": True, "swap": ()}

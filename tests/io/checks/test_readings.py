@@ -340,6 +340,8 @@ def test_flags_state_what_differs_and_the_form_of_boxes_once() -> None:
         "--pose camera-to-world",
         "--swap a=b",
     ]
+    exchanged = replace(given, order=(1, 0))
+    assert list(map(str, stating_flags(given, exchanged, ["a", "b"]))) == ["--as-named"]
     both = replace(given, layout="xyxy", parts=1)
     found = stating_flags(both, replace(both, layout="cxcywh"), ["a", "b"])
     assert list(map(str, found)) == ["--boxes xyxy"]

@@ -114,14 +114,14 @@ def check_verdict(
     Args:
         verdict: What they tell.
         cameras: As they are given.
-        stated: The flags that leave no interpretation that explains the boxes.
-        otherwise: What the boxes tell without these.
+        stated: The flags that leave no interpretation that explains the boxes, or several.
+        otherwise: What the boxes tell without these, where that is decided over them.
         named: The layout of the boxes by their files; None where these leave it open.
     """
     names = [camera.name for camera in cameras]
     best = verdict.best.reading
     share = 100.0 * verdict.best.evidence.share
-    if verdict.kind == "none" and otherwise is not None:
+    if otherwise is not None:
         other = otherwise.best.reading
         return Unexplained(
             f"with {stated} {share:.0f} % of a camera's boxes are explained by another camera's, "
@@ -199,9 +199,11 @@ def stating_flags(wanted: Reading, other: Reading, names: Sequence[str]) -> list
         flags.append(Remedy("--boxes", f"{wanted.layout}{normalised}"))
     if wanted.turns != other.turns:
         flags.append(Remedy("--euler", wanted.turns.split(" in ")[0]))
-    if wanted.order != other.order and wanted.order is not None:
+    if wanted.order is not None and wanted.order != other.order:
         pairs = exchanges(wanted.order, names)
         flags += [Remedy("--swap", f"{first}={second}") for first, second in pairs]
+    elif wanted.order != other.order:
+        flags.append(Remedy("--as-named", ""))
     return flags
 
 

@@ -139,6 +139,12 @@ class Verdict:
         reach = _reach(self.likelihood.moments, fps, _WIDEST)
         return replace(self, confirmed=confirmed, clocks=clocks, reach=reach)
 
+    def outweighs(self, other: Verdict) -> bool:
+        """Whether the best one explains the boxes, and is decided over that of other conventions
+        by the same boxes."""
+        mine, theirs = self.best.evidence.by_moment, other.best.evidence.by_moment
+        return self.kind in ("decided", "open") and log_odds(mine, theirs) >= DECISIVE
+
     def excludes(self, reading: Reading) -> bool:
         """Whether the best one is decided over a reading."""
         return all(

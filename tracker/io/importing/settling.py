@@ -374,9 +374,10 @@ class _PlanDraft:
         verdict = find([*self.raws, *self.spare])
         question = None
         if verdict is not None:
-            stated = _stated_of_poses(self.options) if verdict.kind == "none" else ""
+            unsure = verdict.kind in ("none", "open")
+            stated = _stated_of_poses(self.options) if unsure else ""
             otherwise = find([*self.given, *self.spare]) if stated else None
-            if otherwise is not None and otherwise.kind not in ("decided", "open"):
+            if otherwise is not None and not otherwise.outweighs(verdict):
                 otherwise = None
             question = check_verdict(
                 verdict, [*self.raws, *self.spare], stated, otherwise, self._named
