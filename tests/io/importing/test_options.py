@@ -15,8 +15,8 @@ from app.command.flags import parse
 from app.command.importing import options_of
 from app.command.main import main
 from tests.conftest import short
-from tests.io.read.recorded import assert_boxes, detections, settled_of, toml, videos
-from tests.io.read.rig import SIZE, cameras
+from tests.io.read.recorded import PLACES, assert_boxes, detections, settled_of, toml, videos
+from tests.io.read.rig import SIZE, boxes, cameras
 from tracker.io.checks import check
 from tracker.io.conventions.questions import Undecided, Unexplained
 from tracker.io.conventions.reading import Reading
@@ -75,6 +75,20 @@ def test_files_that_are_matched_by_order_are_named_with_their_cameras(tmp_path: 
         f"{camera.name} = {name}" for camera, name in zip(cameras(), sorted(names), strict=True)
     )
     assert words == f"files go to cameras by order: {told}; --camera NAME=FILE"
+
+
+def test_a_file_of_several_cameras_is_not_said_to_go_to_each(tmp_path: Path) -> None:
+    toml(tmp_path)
+    lines = ["frame,camera,left,top,width,height"]
+    for number, camera in enumerate(cameras()):
+        for frame, box in zip(*boxes(camera, PLACES), strict=True):
+            lines.append(",".join(map(str, [frame, number + 7, *box])))
+    (tmp_path / "all.csv").write_text("\n".join(lines))
+    settled = settled_of(tmp_path)
+    assert_boxes(settled)
+    (words,) = [why for what, why in settled.found if what == "matching"]
+    whose = "cam1, cam2, cam3 and cam4"
+    assert words == f"the parts of a file of several cameras go to {whose} by number"
 
 
 def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path) -> None:

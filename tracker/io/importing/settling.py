@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -80,6 +81,7 @@ from tracker.io.importing.finding.truths import Surroundings, in_gaps, settle_tr
 from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.pieces import DetectionPiece, FormatError, Layout, RawCamera
+from tracker.sequences.fields import listed
 from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 from tracker.sequences.tables import regular_gap
 
@@ -215,9 +217,16 @@ class _PlanDraft:
         """The files by camera."""
         for way in sorted({how for own in matched.cameras for how in own.how.values()} - {"name"}):
             pairs = [(c.raw.name, str(file)) for c in matched.cameras for file in c.files_by(way)]
+            times = Counter(file for _, file in pairs)
+            within = [name for name, file in pairs if times[file] > 1]
+            if within:
+                told = f"the parts of a file of several cameras go to {listed(within)} by {way}"
+                self._note("matching", told)
+            pairs = [pair for pair in pairs if times[pair[1]] == 1]
             files = short_names([file for _, file in pairs])
             told = ", ".join(f"{pair[0]} = {file}" for pair, file in zip(pairs, files, strict=True))
-            self._note("matching", f"files go to cameras by {way}: {told}; --camera NAME=FILE")
+            if told:
+                self._note("matching", f"files go to cameras by {way}: {told}; --camera NAME=FILE")
         exchange_by_shape(matched.cameras, self.notes)
         self.sizes = picture_sizes(matched.cameras, self.notes)
         """The size of each camera's pictures, pixels."""
