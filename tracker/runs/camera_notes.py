@@ -67,7 +67,8 @@ def _delays(errors: CameraErrors, names: list[str], least: float, fps: float) ->
     :data:`~tracker.io.checks.synchronisation.LEAST_STEPS` are none: a step shows the frame that is
     nearest in time.
     """
-    steps = errors.delays * fps - common_offset(errors.delays * fps)
+    steps = errors.delays * fps
+    steps = steps - common_offset(steps)
     bound = np.maximum(least, significant_deviations(len(names)) * errors.delay_sigmas)
     late = (np.abs(errors.delays) > bound) & (np.abs(steps) >= LEAST_STEPS)
     return [

@@ -336,31 +336,25 @@ class Gateway:
         except (ApiError, OSError, TimeoutError, InvalidHandshake):
             await socket.close(1013, "the 3D view is not running")
             return
-        ways: list[asyncio.Task[None]] = []
         try:
             async with upstream:
                 await socket.accept(upstream.subprotocol)
-                ways = [
-                    asyncio.create_task(_to_viser(socket, upstream)),
-                    asyncio.create_task(_to_browser(upstream, socket)),
-                ]
-                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-                await _end(ways)
+                up = asyncio.create_task(_to_viser(socket, upstream))
+                down = asyncio.create_task(_to_browser(upstream, socket))
+                try:
+                    await asyncio.wait({up, down}, return_when=asyncio.FIRST_COMPLETED)
+                finally:  # also where a server that ends cancels this
+                    up.cancel()
+                    down.cancel()
+                    await asyncio.gather(up, down, return_exceptions=True)
         finally:  # a server that ends cancels this even while it says goodbye
             upstream.transport.abort()
-            await _end(ways)
             await asyncio.sleep(0)
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # the browser went first
             code = upstream.close_code
             await socket.close(
                 code if code not in (None, 1005, 1006) else 1001, upstream.close_reason or ""
             )
-
-
-async def _end(tasks: list[asyncio.Task[None]]) -> None:
-    for task in tasks:
-        task.cancel()
-    await asyncio.gather(*tasks, return_exceptions=True)
 
 
 async def _to_viser(socket: WebSocket, upstream: ClientConnection) -> None:
